@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol, runtime_checkable
@@ -107,6 +108,8 @@ class Catalogue:
     def __init__(self, system: System, omega: float, values: Mapping[str, float], how: Integration) -> None:
         self.system, self.omega, self.values, self.how = system, omega, values, how
         self.tolerance = how.tolerance or 0.0
+        #: all that a motion must agree with
+        self.wanted = {**system.parameters, **values, "omega": omega}
         self.known: list[BasinAttractor] = []
         self._sizes: list[Array] = []
 
@@ -180,13 +183,9 @@ class Catalogue:
 
     def _name(self, name: str | None, period: int) -> str:
         """A name that no other one has."""
-        base = name or ("T" if period == 1 else f"{period}T")
-        taken = {one.name for one in self.known}
-        return next(
-            name
-            for name in (base if k == 1 else f"{base} ({k})" for k in range(1, len(taken) + 2))
-            if name not in taken
-        )
+        base, taken = name or ("T" if period == 1 else f"{period}T"), {one.name for one in self.known}
+        names = (base if k == 1 else f"{base} ({k})" for k in itertools.count(1))
+        return next(name for name in names if name not in taken)
 
 
 @dataclass(frozen=True, eq=False)
@@ -252,26 +251,28 @@ def _motion(catalogue: Catalogue, one: Any) -> tuple[Array, int]:
         state, nu, parameters = one.state, one.period, one.parameters
     else:
         raise InputError(f"attractors: {type(one).__name__} is no motion, branch or diagram")
-    wanted = {**catalogue.system.parameters, **catalogue.values, "omega": catalogue.omega}
     has = {**parameters, "omega": one.omega}
-    for name, value in wanted.items():
-        if name in has and abs(has[name] - value) > _NEAR * max(abs(value), 1e-300):
-            raise InputError(f"attractors: {one!r} has {name}={has[name]:.9g}, not {value:.9g}")
+    for name in _differences(catalogue, has):
+        raise InputError(f"attractors: {one!r} has {name}={has[name]:.9g}, not {catalogue.wanted[name]:.9g}")
     return np.asarray(state, dtype=float), int(nu)
+
+
+def _differences(catalogue: Catalogue, has: Mapping[str, float]) -> list[str]:
+    """The names under which a motion has other values."""
+    wanted = catalogue.wanted
+    return [
+        name
+        for name in wanted
+        if abs(has.get(name, wanted[name]) - wanted[name]) > _NEAR * max(abs(wanted[name]), 1e-300)
+    ]
 
 
 def _crossings(catalogue: Catalogue, branch: Curve) -> list[tuple[Array, int]]:
     """States and periods of a branch where it passes these parameters: between its points, or at them."""
-    wanted = {**catalogue.system.parameters, **catalogue.values, "omega": catalogue.omega}
     orbits = branch.orbits
-    if not orbits:
+    if not orbits or set(_differences(catalogue, {**orbits[0].values, "omega": orbits[0].omega})) - {branch.name}:
         return []
-    for name, value in wanted.items():
-        if name != branch.name and name in {**orbits[0].values, "omega": 0.0}:
-            has = orbits[0].omega if name == "omega" else orbits[0].values[name]
-            if abs(has - value) > _NEAR * max(abs(value), 1e-300):
-                return []
-    at = np.asarray(branch.parameter(branch.name), dtype=float) - wanted[branch.name]
+    at = np.asarray(branch.parameter(branch.name), dtype=float) - catalogue.wanted[branch.name]
     crossings = []
     for i in range(len(at) - 1):
         if at[i] == 0.0 or at[i] * at[i + 1] < 0.0:

@@ -27,7 +27,7 @@ from suboctave.model.inputs import check_count, check_omega, check_range, start_
 from suboctave.model.system import System, describe
 from suboctave.options import with_options
 from suboctave.progress import reporting
-from suboctave.store.journal import Journal
+from suboctave.store.journal import Journal, Record
 from suboctave.store.plain import from_json, padded, to_json
 from suboctave.timedomain.flow import Flow, Motions, Report, check_extent
 
@@ -90,16 +90,19 @@ class Basins(TimeResult):
         return {i: names[i] for i in sorted(set(np.unique(self.labels).tolist()), key=lambda i: (i < 0, abs(i)))}
 
     @property
+    def _computed(self) -> int:
+        """How many states were computed, at least one."""
+        return max(int((self.labels != OPEN).sum()), 1)
+
+    @property
     def shares(self) -> dict[str, float]:
         """The share of the computed states that each has, by name."""
-        count = max(int((self.labels != OPEN).sum()), 1)
-        return {name: float((self.labels == i).sum()) / count for i, name in self.names.items() if i != OPEN}
+        return {name: float((self.labels == i).sum()) / self._computed for i, name in self.names.items() if i != OPEN}
 
     @property
     def standard_errors(self) -> dict[str, float]:
         """Of the shares, if the states were drawn at random: `sqrt(s (1 - s) / N)`. An upper bound for a grid."""
-        count = max(int((self.labels != OPEN).sum()), 1)
-        return {name: float(np.sqrt(s * (1.0 - s) / count)) for name, s in self.shares.items()}
+        return {name: float(np.sqrt(s * (1.0 - s) / self._computed)) for name, s in self.shares.items()}
 
     @property
     def grid_errors(self) -> dict[str, float]:
@@ -108,12 +111,8 @@ class Basins(TimeResult):
         The B states next to one of another label count with a standard deviation of half a cell each, independently:
         `sqrt(B) / (2 N)`. Where boundaries are finer than the grid, `standard_errors` say more.
         """
-        count = max(int((self.labels != OPEN).sum()), 1)
-        return {
-            name: float(np.sqrt(_at_boundary(self.labels == i).sum()) / (2.0 * count))
-            for i, name in self.names.items()
-            if i != OPEN
-        }
+        at_boundary = {name: _at_boundary(self.labels == i).sum() for i, name in self.names.items() if i != OPEN}
+        return {name: float(np.sqrt(count) / (2.0 * self._computed)) for name, count in at_boundary.items()}
 
     def attractor_at(self, x: float, y: float) -> BasinAttractor | None:
         """The attractor of the state next to a point of the plane; None if its motion is aperiodic or unknown."""
@@ -131,7 +130,6 @@ class Basins(TimeResult):
         """Labels and settling times on (y, x), and the attractors."""
         known, one = self.attractors, ("attractor",)
         points = np.vstack([np.zeros((0, 2 * self.system.n)), *(one.points for one in known)])
-        shares, errors, grid = self.shares, self.standard_errors, self.grid_errors
         variables = {
             "period": (one, np.array([one.period for one in known], dtype=int)),
             "amplitude": (one, np.array([one.amplitude for one in known])),
@@ -139,42 +137,33 @@ class Basins(TimeResult):
             "multipliers": (("attractor", "multiplier"), padded([one.multipliers for one in known], complex)),
             "points": (("section", "state"), points),
             "point_of": (("section",), np.repeat(np.arange(len(known)), [one.period for one in known]).astype(int)),
-            "share": (("kind",), np.array([shares[name] for name in shares])),
-            "standard_error": (("kind",), np.array([errors[name] for name in shares])),
-            "grid_error": (("kind",), np.array([grid[name] for name in shares])),
         }
-        coordinates = {"attractor": [one.name for one in known], "kind": list(shares)}
+        for name, by_kind in (
+            ("share", self.shares), ("standard_error", self.standard_errors), ("grid_error", self.grid_errors)
+        ):  # fmt: skip
+            variables[name] = ("kind",), np.array(list(by_kind.values()))
+        coordinates = {"attractor": [one.name for one in known], "kind": list(self.shares)}
         return self._dataset(variables, coordinates, {"plane_x": self.plane[0], "plane_y": self.plane[1]})
 
     def to_dataframe(self) -> pandas.DataFrame:
         """One row for each label that occurs: name, period, amplitude, share and its errors."""
         import pandas as pd
 
-        by_name = {one.name: one for one in self.attractors}
-        rows = [
-            (
-                name,
-                by_name[name].period if name in by_name else 0,
-                by_name[name].amplitude if name in by_name else np.nan,
-                share,
-                self.standard_errors[name],
-                self.grid_errors[name],
-            )
-            for name, share in self.shares.items()
-        ]
-        return pd.DataFrame(rows, columns=["name", "period", "amplitude", "share", "standard_error", "grid_error"])
+        known = {one.name: (one.period, one.amplitude) for one in self.attractors}
+        motions = [(name, *known.get(name, (0, np.nan))) for name in self.shares]
+        errors = {"standard_error": self.standard_errors.values(), "grid_error": self.grid_errors.values()}
+        frame = pd.DataFrame(motions, columns=["name", "period", "amplitude"])
+        return frame.assign(share=self.shares.values(), **errors)
 
     def plot(self, path: Any = None, **options: Any) -> Any:
         """The plane in one colour for each attractor, stroboscopic points marked; saved if a path is given.
 
         Options are those of `pictures.plot_basins`: `points`, `title`, `size`.
         """
-        marks = [one.points[:, self._columns()] for one in self.attractors] if self.system.n == 1 else None
-        return super().plot(path, **{"points": marks, **options})
-
-    def _columns(self) -> list[int]:
         names = coordinates(self.system)
-        return [names.index(name) for name in self.plane]
+        columns = [names.index(name) for name in self.plane]
+        marks = [one.points[:, columns] for one in self.attractors] if self.system.n == 1 else None
+        return super().plot(path, **{"points": marks, **options})
 
     def __repr__(self) -> str:
         shares = ", ".join(f"{name} {share:.4f} +- {self.grid_errors[name]:.1g}" for name, share in self.shares.items())
@@ -313,8 +302,8 @@ def _box(box: Any) -> list[tuple[float, float]]:
         raise InputError(f"box={box!r}: give ((from, to), (from, to)) of the two coordinates")
     sides = []
     for name, side in zip(("box, first coordinate", "box, second coordinate"), box, strict=True):
-        low, high = check_range(name, tuple(side) if isinstance(side, list | np.ndarray) else side, False)
-        sides.append((min(low, high), max(low, high)))
+        low, high = sorted(check_range(name, tuple(side) if isinstance(side, list | np.ndarray) else side, False))
+        sides.append((low, high))
     return sides
 
 
@@ -359,17 +348,17 @@ class BasinRun:
         if not place.exists() and not place.parent.is_dir():
             raise InputError(f"{place.parent} is no folder: make it, or keep elsewhere")
         self.journal = Journal.reopen(place) if place.exists() else Journal.create(place)
-        goes_on = bool(self.journal.records)
+        records = self.journal.records
         try:
-            if goes_on:
-                self._restore(mark, given, place)
+            if records:
+                self._restore(records, mark, given, place)
                 return
             enter_attractors(self.catalogue, given)
         except BaseException:
-            (self.journal.close if goes_on else self.journal.remove)()
+            (self.journal.close if records else self.journal.remove)()
             raise
         attractors = [[one.name, one.words, [[state.tolist(), nu] for state, nu in one.starts]] for one in given]
-        self.journal.append("basins", {"mark": mark, "attractors": attractors})
+        self._keep("basins", {"mark": mark, "attractors": attractors})
         self._keep_attractors(0)
 
     def close(self) -> None:
@@ -386,26 +375,25 @@ class BasinRun:
         ])  # fmt: skip
         return hashlib.sha256(text.encode() + self.states.tobytes()).hexdigest()
 
-    def _restore(self, mark: str, given: Sequence[Given], place: Path) -> None:
-        assert self.journal is not None
-        for record in self.journal.records:
+    def _restore(self, records: Sequence[Record], mark: str, given: Sequence[Given], place: Path) -> None:
+        for record in records:
+            entry = record.fields
             if record.kind == "basins":
-                if record.fields["mark"] != mark:
+                if entry["mark"] != mark:
                     raise InputError(
                         f"{place} is of other basins (another system, frequency, grid or option): name another file"
                     )
-                self._compare(record.fields.get("attractors"), given, place)
-            if record.kind == "attractor":
-                entry = record.fields
+                self._compare(entry.get("attractors"), given, place)
+            elif record.kind == "attractor":
                 points, multipliers = (from_json(entry[name]) for name in ("points", "multipliers"))
                 self.catalogue.enter(entry["name"], points, entry["amplitude"], multipliers, entry["given"])
             elif record.kind == "chunk":
-                at = slice(int(record.fields["begin"]), int(record.fields["end"]))
+                at = slice(int(entry["begin"]), int(entry["end"]))
                 self.labels[at] = record.dataset["label"].to_numpy()
                 self.settling[at] = record.dataset["settling"].to_numpy()
                 self._next = at.stop
             elif record.kind == "followed":
-                self.followed, self.contradicted = int(record.fields["followed"]), int(record.fields["contradicted"])
+                self.followed, self.contradicted = int(entry["followed"]), int(entry["contradicted"])
                 self._audited = True
 
     def _compare(self, written: Any, given: Sequence[Given], place: Path) -> None:
@@ -419,10 +407,17 @@ class BasinRun:
         what = f"with attractors={first}, not {now}" if first != now else f"with other motions as attractors={now}"
         raise InputError(f"{place} was begun {what}: give the same ones, or name another file")
 
+    def _keep(self, kind: str, fields: Mapping[str, Any], **variables: NDArray[Any]) -> None:
+        """Append a record to the journal, if there is one."""
+        if self.journal is not None:
+            import xarray
+
+            dataset = xarray.Dataset({name: ("cell", values) for name, values in variables.items()})
+            self.journal.append(kind, fields, dataset if variables else None)
+
     def _keep_attractors(self, first: int) -> None:
-        for one in self.catalogue.known[first:] if self.journal is not None else ():
-            assert self.journal is not None
-            self.journal.append("attractor", {
+        for one in self.catalogue.known[first:]:
+            self._keep("attractor", {
                 "name": one.name, "points": to_json(one.points), "multipliers": to_json(np.asarray(one.multipliers)),
                 "amplitude": float(one.amplitude), "given": one.given,
             })  # fmt: skip
@@ -444,11 +439,7 @@ class BasinRun:
             labels, settling = self._settle(self.states[begin:end], progress)
             self.labels[begin:end], self.settling[begin:end] = labels, settling
             self._keep_attractors(known)
-            if self.journal is not None:
-                import xarray
-
-                chunk = xarray.Dataset({"label": (("cell",), labels), "settling": (("cell",), settling)})
-                self.journal.append("chunk", {"begin": begin, "end": end}, chunk)
+            self._keep("chunk", {"begin": begin, "end": end}, label=labels, settling=settling)
         if not self._audited:
             self._follow_some()
 
@@ -518,5 +509,4 @@ class BasinRun:
                 self.followed = len(cells)
                 self.contradicted = int((self.catalogue.trapped(end) != self.labels[cells]).sum())
         self._audited = True
-        if self.journal is not None:
-            self.journal.append("followed", {"followed": self.followed, "contradicted": self.contradicted})
+        self._keep("followed", {"followed": self.followed, "contradicted": self.contradicted})

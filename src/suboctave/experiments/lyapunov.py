@@ -284,30 +284,29 @@ def _exponents(
 def averaged(rates: Array) -> tuple[bool, Array, Array, Array]:
     """Averages of rates (B, P, k): whether smooth weights are better, means and standard errors (k,), stretches."""
     several, periods, k = rates.shape
-    pieces = _STRETCHES if periods >= 8 * _STRETCHES else 1
-    length = periods // pieces
-    cut = rates[:, periods - pieces * length :].reshape(several * pieces, length, k)
+    each = over_stretches(rates, _STRETCHES if periods >= 8 * _STRETCHES else 1)
+    rows = each.reshape(2, -1, k)
+    means, errors = rows.mean(axis=1), np.full((2, k), np.nan)
+    if rows.shape[1] > 1:
+        errors = rows.std(axis=1, ddof=1) / np.sqrt(rows.shape[1])
+    if several > 1:
+        errors = np.maximum(errors, each.mean(axis=2).std(axis=1, ddof=1) / np.sqrt(several))
+    equal, smooth = np.sum(errors[:, :-1] ** 2, axis=1)
+    if not smooth < equal:
+        return False, means[0], errors[0], rows[0]
     # over whole trajectories; what stretches differ from it by is what they may all have in common
     whole = np.einsum("p,bpk->bk", smooth_weights(periods), rates).mean(axis=0)
-    best: tuple[bool, Array, Array, Array] | None = None
-    least = np.inf
-    for smooth in (False, True):
-        weights = smooth_weights(length) if smooth else np.full(length, 1.0 / length)
-        rows = np.einsum("p,npk->nk", weights, cut)
-        error = np.full(k, np.nan)
-        if len(rows) > 1:
-            error = rows.std(axis=0, ddof=1) / np.sqrt(len(rows))
-        if several > 1:
-            each = rows.reshape(several, pieces, k).mean(axis=1)
-            error = np.maximum(error, each.std(axis=0, ddof=1) / np.sqrt(several))
-        mean = rows.mean(axis=0)
-        score = float(np.sum(error[:-1] ** 2))
-        if smooth:
-            mean, error = whole, np.maximum(error, np.abs(whole - mean))
-        if best is None or score < least:
-            best, least = (smooth, mean, error, rows), score
-    assert best is not None
-    return best
+    return True, whole, np.maximum(errors[1], np.abs(whole - means[1])), rows[1]
+
+
+def over_stretches(rates: Array, pieces: int) -> Array:
+    """Averages (2, B, pieces, k) of rates (B, P, k) over equal stretches, with equal weights and with smooth ones."""
+    count, periods, k = rates.shape
+    length = periods // pieces
+    cut = rates[:, periods - pieces * length :].reshape(count, pieces, length, k)
+    weights = np.array([np.full(length, 1.0 / length), smooth_weights(length)])
+    averages: Array = np.einsum("wp,bspk->wbsk", weights, cut)
+    return averages
 
 
 def smooth_weights(count: int) -> Array:

@@ -18,7 +18,7 @@ from suboctave.experiments.common import (
     checked_range,
     varied_grid,
 )
-from suboctave.experiments.lyapunov import smooth_weights
+from suboctave.experiments.lyapunov import over_stretches, smooth_weights
 from suboctave.model.elements.base import Array
 from suboctave.model.inputs import check_count, check_parameter, start_state, timed
 from suboctave.model.system import System
@@ -186,16 +186,10 @@ def lyapunov_map(
 
 def _averaged(growth: Array) -> tuple[Array, Array]:
     """Mean growth (B,) per period and its standard error, from growths (B, P) cut into stretches."""
-    periods = growth.shape[1]
-    length = periods // _STRETCHES
-    cut = growth[:, periods - _STRETCHES * length :].reshape(-1, _STRETCHES, length)
-    means, errors = [], []
-    for weights in (np.full(length, 1.0 / length), smooth_weights(length)):
-        each = cut @ weights
-        means.append(each.mean(axis=1))
-        errors.append(each.std(axis=1, ddof=1) / np.sqrt(_STRETCHES))
+    each = over_stretches(growth[:, :, None], _STRETCHES)[..., 0]
+    means, errors = each.mean(axis=2), each.std(axis=2, ddof=1) / np.sqrt(_STRETCHES)
     # over the whole trajectory it is better still; what it differs by is what all stretches may have in common
-    whole = growth @ smooth_weights(periods)
+    whole = growth @ smooth_weights(growth.shape[1])
     errors[1], means[1] = np.maximum(errors[1], np.abs(whole - means[1])), whole
     # stretches of a regular motion may all be wrong by the same
     errors[0] = np.maximum(errors[0], np.abs(whole - means[0]))

@@ -71,15 +71,12 @@ def read_measured(
         with place.open(newline="", encoding="utf-8-sig") as file:
             rows = csv.reader(file)
             header = [name.strip() for name in next(rows, [])]
-            at = [_column(place, header, name) for name in (frequency, amplitude)]
-            values = []
-            for row in rows:
-                if row and any(entry.strip() for entry in row):
-                    values.append([_number(place, rows.line_num, row, i, header[i]) for i in at])
-                    if not values[-1][0] > 0.0:
-                        raise InputError(
-                            f"{place}, line {rows.line_num}: {frequency}={values[-1][0]:g} is no frequency"
-                        )
+            columns = [(_column(place, header, name), name) for name in (frequency, amplitude)]
+            values = [
+                [_number(f"{place}, line {rows.line_num}", row, at, name, name == frequency) for at, name in columns]
+                for row in rows
+                if any(entry.strip() for entry in row)
+            ]
     except OSError as error:
         raise InputError(f"{place} cannot be read: {error.strerror}") from None
     except (UnicodeDecodeError, csv.Error) as error:
@@ -102,13 +99,15 @@ def _column(place: Path, header: list[str], name: str) -> int:
     return header.index(name)
 
 
-def _number(place: Path, line: int, row: list[str], at: int, name: str) -> float:
+def _number(where: str, row: list[str], at: int, name: str, positive: bool) -> float:
     if at >= len(row):
-        raise InputError(f"{place}, line {line}: {len(row)} entries, so that {name!r} is missing")
+        raise InputError(f"{where}: {len(row)} entries, so that {name!r} is missing")
     try:
         value = float(row[at])
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise InputError(f"{place}, line {line}: {name}={row[at].strip()!r} is no finite number")
+        raise InputError(f"{where}: {name}={row[at].strip()!r} is no finite number")
+    if positive and not value > 0.0:
+        raise InputError(f"{where}: {name}={value:g} is no frequency")
     return value

@@ -40,7 +40,7 @@ from suboctave.model.inputs import check_count, observed_dof, start_state, timed
 from suboctave.model.system import System
 from suboctave.options import with_options
 from suboctave.progress import Report, reporting
-from suboctave.timedomain.flow import Flow, Motions, check_extent
+from suboctave.timedomain.flow import Flow, check_extent
 
 if TYPE_CHECKING:
     import pandas
@@ -95,20 +95,17 @@ def stepped_sine(
         If the motion leaves the range of numbers.
     """
     how = checked_integration(system, options)
-    given = (steps, direction, settle, measure, state, tap, harmonics, noise, seed)
-    test, start, where = _checked(system, how, omega, *given)
-    grid, directions = test.grid, ("up", "down") if direction == "both" else (direction,)
-    flows = tuple(Flow(system, "accurate", samples, 1000, how.tolerance, lanes=FEW) for samples in (1, _SAMPLES))
-    shape = (len(directions), len(grid))
+    test = _Test(system, how, omega, steps, direction, settle, measure, state, tap, harmonics, noise, seed)
+    shape, n = (len(test.directions), len(test.grid)), system.n
     out = SteppedSine(
-        grid, directions, test.multiples, np.full((*shape, len(test.multiples), system.n), np.nan, dtype=complex),
-        np.full((*shape, system.n), np.nan, dtype=complex), np.full((*shape, system.n), np.nan),
-        np.full(shape, -1), np.full((*shape, 2 * system.n), np.nan), np.full(len(directions), np.nan), True,
-        test.settle, test.measure, test.noise, how.observe, system,
+        test.grid, test.directions, test.multiples, np.full((*shape, len(test.multiples), n), np.nan, dtype=complex),
+        np.full((*shape, n), np.nan, dtype=complex), np.full((*shape, n), np.nan), np.full(shape, -1),
+        np.full((*shape, 2 * n), np.nan), np.full(shape[0], np.nan), True,
+        test.settle, test.measure, float(noise), how.observe, system,
     )  # fmt: skip
     with reporting(options.get("progress"), "stepped sine") as report:
         try:
-            test.run(flows, out, start, where, np.random.default_rng(seed), report)
+            test.run(out, report)
         except KeyboardInterrupt as cause:
             out.complete, out.interruption = False, Interruption.of(cause)
     return out
@@ -116,87 +113,80 @@ def stepped_sine(
 
 def check_stepped_sine(system: System, omega: Any, observe: int | None = None, **arguments: Any) -> None:
     """Refuse arguments of `stepped_sine`; nothing is computed."""
-    _checked(system, checked_integration(system, {"observe": observe}), omega, **{"seed": 0, **arguments})
-
-
-def _checked(
-    system: System,
-    how: Integration,
-    omega: Any,
-    steps: int,
-    direction: str,
-    settle: int,
-    measure: int,
-    state: Any,
-    tap: Any,
-    harmonics: Sequence[float],
-    noise: float,
-    seed: int,
-) -> tuple[_Test, Array, tuple[float, int, float] | None]:
-    """The test, where it begins, and the tap; InputError."""
-    start = start_state(system, state)
-    # a range in so many steps has one more frequency
-    is_range = isinstance(omega, tuple) and len(omega) == 2
-    grid = checked_range("omega", omega, check_count("steps", steps) + 1 if is_range else 0, True)
-    if direction not in _DIRECTIONS:
-        raise InputError(f"direction={direction!r}: up, down or both{suggest(str(direction), _DIRECTIONS)}")
-    settle, measure = check_count("settle", settle), check_count("measure", measure)
-    multiples = _multiples(harmonics, measure)
-    if not (is_number(noise) and noise >= 0.0):
-        raise InputError(f"noise must be a standard deviation in the unit of the response, 0 or more, not {noise!r}")
-    try:
-        np.random.default_rng(seed)
-    except (TypeError, ValueError):
-        raise InputError(f"seed must be a whole number, 0 or more, not {shortened(seed)}") from None
-    _loads(system, float(grid[0]))
-    tests = len(grid) * (2 if direction == "both" else 1)
-    check_extent(tests, settle + measure, tests * 2 * system.n * (len(multiples) + 3))
-    return _Test(system, how, grid, settle, measure, multiples, float(noise)), start, _tap(system, tap, grid)
+    _Test(system, checked_integration(system, {"observe": observe}), omega, **{"seed": 0, **arguments})
 
 
 @dataclass
 class _Test:
-    """One test on its way."""
+    """The arguments of `stepped_sine`, once they have been checked."""
 
     system: System
     how: Integration
-    grid: Array
+    omega: Any
+    steps: int
+    direction: str
     settle: int
     measure: int
-    multiples: Array
+    state: Any
+    tap: Any
+    harmonics: Sequence[float]
     noise: float
+    seed: int
 
-    def run(
-        self,
-        flows: tuple[Flow, ...],
-        out: SteppedSine,
-        start: Array,
-        tap: tuple[float, int, float] | None,
-        random: np.random.Generator,
-        report: Report | None,
-    ) -> None:
-        """Both directions side by side, step by step."""
+    def __post_init__(self) -> None:
+        self.start = start_state(self.system, self.state)
+        # a range in so many steps has one more frequency
+        is_range = isinstance(self.omega, tuple) and len(self.omega) == 2
+        self.grid = checked_range("omega", self.omega, check_count("steps", self.steps) + 1 if is_range else 0, True)
+        if self.direction not in _DIRECTIONS:
+            raise InputError(
+                f"direction={self.direction!r}: up, down or both{suggest(str(self.direction), _DIRECTIONS)}"
+            )
+        self.directions = ("up", "down") if self.direction == "both" else (self.direction,)
+        self.settle, self.measure = check_count("settle", self.settle), check_count("measure", self.measure)
+        self.multiples = _multiples(self.harmonics, self.measure)
+        if not (is_number(self.noise) and self.noise >= 0.0):
+            raise InputError(
+                f"noise must be a standard deviation in the unit of the response, 0 or more, not {self.noise!r}"
+            )
+        try:
+            self.random = np.random.default_rng(self.seed)
+        except (TypeError, ValueError):
+            raise InputError(f"seed must be a whole number, 0 or more, not {shortened(self.seed)}") from None
+        _loads(self.system, float(self.grid[0]))
+        tests, size = len(self.grid) * len(self.directions), 2 * self.system.n
+        check_extent(tests, self.settle + self.measure, tests * size * (len(self.multiples) + 3))
+        self.tapped = _tap(self.system, self.tap, self.grid)
+
+    def run(self, out: SteppedSine, report: Report | None) -> None:
+        """All directions side by side, step by step."""
         count, n = len(self.grid), self.system.n
-        up = np.array([direction == "up" for direction in out.directions])
-        states = np.repeat(start[None], len(up), axis=0)
+        settling, measured = (
+            Flow(self.system, "accurate", samples, tolerance=self.how.tolerance, lanes=FEW) for samples in (1, _SAMPLES)
+        )
+        up = np.array([direction == "up" for direction in self.directions])
+        states = np.repeat(self.start[None], len(up), axis=0)
         for step in range(count):
             columns = np.where(up, step, count - 1 - step)
             w = self.grid[columns]
-            if tap is not None:
-                at = np.where(up, w >= tap[0], w <= tap[0]) & np.isnan(out.tapped)
-                if at.any():
-                    states[at] = _over(flows[0], states[at], w[at], self.settle).end
-                    states[at, n + tap[1]] += tap[2]
-                    out.tapped[at] = w[at]
-            states = _over(flows[0], states, w, self.settle).end
-            motions = _over(flows[1], states, w, self.measure, measured=True)
+            if self.tapped is not None:
+                at, dof, change = self.tapped
+                now = np.where(up, w >= at, w <= at) & np.isnan(out.tapped)
+                if now.any():
+                    states[now] = (
+                        settling.over(states[now], w[now], self.settle, skip=self.settle, workers=1).checked().end
+                    )
+                    states[now, n + dof] += change
+                    out.tapped[now] = w[now]
+            states = settling.over(states, w, self.settle, skip=self.settle, workers=1).checked().end
+            motions = measured.over(states, w, self.measure, measure=True, workers=1).checked()
             states = motions.end.copy()
             for s, v in enumerate(columns):
                 x, peaks = motions.states[s], motions.peaks[s]
                 largest = peaks.reshape(self.measure, -1, n).max(axis=1)
                 settled = self._attractor(x[_SAMPLES - 1 :: _SAMPLES], largest, float(w[s]))
                 out.period[s, v], out.largest[s, v], out.ends[s, v] = settled.period, largest.max(axis=0), states[s]
-                samples = x[:, :n] + (random.normal(0.0, self.noise, (len(x), n)) if self.noise else 0.0)
+                samples = x[:, :n] + (self.random.normal(0.0, self.noise, (len(x), n)) if self.noise else 0.0)
                 out.components[s, v], out.response[s, v] = self._measured(samples, float(w[s]))
             if report is not None:
                 report((step + 1) / count, f"omega = {w[0]:.6g}")
@@ -220,12 +210,6 @@ class _Test:
         loads = (2.0 / _SAMPLES) * (carrier * p).reshape(self.measure, _SAMPLES).sum(axis=1)
         cross = np.sum(per_period * np.conj(loads)[:, None], axis=0)
         return components, abs(load) * cross / np.sum(np.abs(loads) ** 2)
-
-
-def _over(flow: Flow, states: Array, omega: Array, periods: int, measured: bool = False) -> Motions:
-    """Follow states; their samples and the largest displacements in between are kept of what is measured."""
-    skip = 0 if measured else periods * flow.samples
-    return flow.over(states, omega, periods, skip=skip, measure=measured, workers=1).checked()
 
 
 def _loads(system: System, omega: float) -> complex:
