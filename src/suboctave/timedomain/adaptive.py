@@ -13,7 +13,6 @@ of a continuous force the tangent flow is continuous, so nothing is added there.
 
 from __future__ import annotations
 
-import functools
 from typing import Any
 
 import numpy as np
@@ -59,11 +58,11 @@ def adaptive_rows(layout: Layout, lanes: int, count: int) -> Rows:
     shapes: dict[str, int | tuple[int, ...]] = {
         **dict.fromkeys(SCALARS, 1),
         "A": (n, n), "B": (n, n), "L": (n, waves), "E": (n, k), "c": layout.law_numbers,
-        "y": 2 * n, "trial": 2 * n, "K": (13, 2 * n), "e3": 2 * n, "e5": 2 * n, "rate": 2 * n, "F": k, "wave": waves,
+        "y": 2 * n, "trial": (2, n), "K": (13, 2, n), "e3": 2 * n, "e5": 2 * n, "rate": (2, n), "F": k, "wave": waves,
         **dict.fromkeys(("on", "g", "dg", "g1", "dg1"), corners),
         **dict.fromkeys(("now", "past", "floor", "peak", "crest", "weight"), n),
         **callback_shapes(layout.called_back),
-        "w": (count, 2 * n), "goal": (count, 2 * n), "W": (12, count, 2 * n), "metric": 2 * n, "log": count,
+        "w": (count, 2 * n), "goal": (count, 2, n), "W": (12, count, 2, n), "metric": 2 * n, "log": count,
     }  # fmt: skip
     if count:
         shapes |= {"dF": k, "S": (k, m, 2), "G": (m, k), "trace": 1}
@@ -170,7 +169,7 @@ class _AdaptiveCode(LawCode):
         """The first stage and the flags, at the state itself."""
         n, z, code = self.n, self.z, self.code
         with code.block(f"for i in range({2 * n}):"):
-            code.each(f"{z('trial', 'i')} = {z('y', 'i')}", f"{z('K', 12, 'i')} = 0.0")
+            code.each(f"{z('trial', 'i')} = {z('y', 'i')}", f"{z('K', 12, 0, 'i')} = 0.0")
         code.each(f"{z('theta')} = {z('omega')} * {z('t')}")
         for at_corner in ("False", "{} > 0.0"):
             self._corners()
@@ -181,7 +180,7 @@ class _AdaptiveCode(LawCode):
             if at_corner == "False":
                 self._rate(slopes=False)
                 with code.block(f"for i in range({2 * n}):"):
-                    code.each(f"{z('K', 0, 'i')} = {z('rate', 'i')}", f"{z('K', 12, 'i')} = {z('rate', 'i')}")
+                    code.each(f"{z('K', 0, 0, 'i')} = {z('rate', 'i')}", f"{z('K', 12, 0, 'i')} = {z('rate', 'i')}")
         for i in range(self.layout.corners):
             code.each(f"{z('g', i)} = {z('g1', i)}", f"{z('dg', i)} = {z('dg1', i)}")
         return code.function("begin(z, address)")
@@ -207,15 +206,15 @@ class _AdaptiveCode(LawCode):
             self._rate(slopes=bool(self.count))
             with code.block("if s == 0:"):
                 with code.block(f"for i in range({2 * n}):"):
-                    code.each(f"{z('K', 0, 'i')} = {z('rate', 'i')} if {z('stale')} > 0.0 else {z('K', 0, 'i')}")
+                    code.each(f"{z('K', 0, 0, 'i')} = {z('rate', 'i')} if {z('stale')} > 0.0 else {z('K', 0, 0, 'i')}")
                 code.each(f"{z('stale')} = 0.0")
             with code.block("else:"), code.block(f"for i in range({2 * n}):"):
-                code.each(f"{z('K', 's', 'i')} = {z('rate', 'i')}")
+                code.each(f"{z('K', 's', 0, 'i')} = {z('rate', 'i')}")
             if self.count:
                 with code.block("if s < 12:"):
                     self._tangents()
         with code.block(f"for i in range({2 * n}):"):
-            self._errors(13, z("e3", "i"), z("e5", "i"), z("K", "j", "i"))
+            self._errors(13, z("e3", "i"), z("e5", "i"), z("K", "j", 0, "i"))
         if self.count:
             self._tangent_errors()
         self._corners()
@@ -242,15 +241,9 @@ class _AdaptiveCode(LawCode):
 
     def _channels(self) -> list[str]:
         """Lines that read the phase and the channels at the trial state."""
-        lines = [f"theta = {self.z('theta')}"]
-        for j in range(self.m):
-            for kind, first in (("q", 0), ("r", self.n)):
-                reading = self.along(j, functools.partial(self._trial, first))
-                lines.append(f"{kind}{j} = {reading}")
-        return lines
-
-    def _trial(self, first: int, i: int) -> str:
-        return self.z("trial", first + i)
+        parts = [("q", lambda i: self.z("trial", i)), ("r", lambda i: self.z("trial", 1, i))]
+        reading = [f"{kind}{j} = {self.along(j, entry)}" for j in range(self.m) for kind, entry in parts]
+        return [f"theta = {self.z('theta')}", *reading]
 
     def _corners(self) -> None:
         """Margins of the corners and their rates, at the trial state and its rate in the last stage."""
@@ -258,7 +251,7 @@ class _AdaptiveCode(LawCode):
         if not self.layout.corners:
             return
         code.each(*self._channels())
-        code.each(*(f"a{j} = {self.along(j, lambda i: z('K', 12, self.n + i))}" for j in range(self.m)))
+        code.each(*(f"a{j} = {self.along(j, lambda i: z('K', 12, 1, i))}" for j in range(self.m)))
         code.each(f"omega = {z('omega')}")
         for placed in self.layout.laws:
             for i in range(placed.form.corners):
@@ -288,13 +281,10 @@ class _AdaptiveCode(LawCode):
             return " + ".join(f"{z('L', i, w)} * {z('wave', w)}" for w in range(len(waves))) or "0.0"
 
         def velocity(i: Index) -> str:
-            return z("trial", n + i if isinstance(i, int) else f"{n} + {i}")
-
-        def acceleration(i: Index) -> str:
-            return z("rate", n + i if isinstance(i, int) else f"{n} + {i}")
+            return z("trial", 1, i)
 
         code.rows("i", n, lambda i: code.each(f"{z('rate', i)} = {velocity(i)}"))
-        self.row_sums(acceleration, loads, lambda j: z("trial", j), velocity, "F")
+        self.row_sums(lambda i: z("rate", 1, i), loads, lambda j: z("trial", j), velocity, "F")
 
     def _slope(self, o: int, j: int, by_rate: bool) -> str:
         return self.z("S", o, j, int(by_rate))
@@ -306,10 +296,10 @@ class _AdaptiveCode(LawCode):
         code.each(f"{z('volume_rate')} += STAGES[12, s] * ({z('trace')}{damping})")
 
         def vector(i: Index) -> str:
-            return z("goal", "c", i)
+            return z("goal", "c", 0, i)
 
         def its_rate(i: Index) -> str:
-            return z("goal", "c", n + i if isinstance(i, int) else f"{n} + {i}")
+            return z("goal", "c", 1, i)
 
         with code.block(f"for c in range({self.count}):"):
             for o in range(k):
@@ -319,12 +309,8 @@ class _AdaptiveCode(LawCode):
                     if output == o
                 ]
                 code.each(f"{z('dF', o)} = {' + '.join(terms) or '0.0'}")
-            code.rows("i", n, lambda i: code.each(f"{z('W', 's', 'c', i)} = {its_rate(i)}"))
-            self.row_sums(
-                lambda i: z("W", "s", "c", n + i if isinstance(i, int) else f"{n} + {i}"),
-                lambda _: "0.0",
-                *(vector, its_rate, "dF"),
-            )
+            code.rows("i", n, lambda i: code.each(f"{z('W', 's', 'c', 0, i)} = {its_rate(i)}"))
+            self.row_sums(lambda i: z("W", "s", "c", 1, i), lambda _: "0.0", vector, its_rate, "dF")
 
     def _tangent_errors(self) -> None:
         """The error of the tangent vectors, each relative to its length, in units of the motion's tolerance."""
@@ -334,12 +320,12 @@ class _AdaptiveCode(LawCode):
         with code.block(f"for c in range({self.count}):"):
             code.each(*(f"{z(name)} = 0.0" for name in ("sum3", "sum5", "before", "after")))
             with code.block(f"for i in range({size}):"):
-                self._errors(12, z("part3"), z("part5"), z("W", "j", "c", "i"))
+                self._errors(12, z("part3"), z("part5"), z("W", "j", "c", 0, "i"))
                 parts = {
                     "sum3": z("part3"),
                     "sum5": z("part5"),
                     "before": z("w", "c", "i"),
-                    "after": z("goal", "c", "i"),
+                    "after": z("goal", "c", 0, "i"),
                 }
                 code.each(*(f"{z(name)} += ({weight} * {part}) ** 2" for name, part in parts.items()))
             code.each(

@@ -10,7 +10,7 @@ is there). Every gap, and every point where a smooth law is sharp, is a switch: 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +21,7 @@ from suboctave.model import System
 from suboctave.model.elements.base import BaseElement
 from suboctave.model.elements.coupled import as_coupled
 from suboctave.model.elements.smoothness import switches
+from suboctave.model.expressions.coefficients import Coefficient
 
 __all__ = ["Array", "Field", "Switch", "default_lengths", "scaled_field"]
 
@@ -60,28 +61,20 @@ class _Loads:
     phase_slope: Array
 
 
-def _loads(system: System, values: Mapping[str, float], omega: float) -> _Loads:
+def _loads(system: System, at: Mapping[str, float]) -> _Loads:
     components = system.load_components()
-    at = {**values, "omega": omega}
 
-    def read(kind: str, slope: bool) -> Array:
-        out = np.zeros(len(components))
-        for i, component in enumerate(components):
-            coefficient = getattr(component, kind)
-            if not slope:
-                out[i] = coefficient.value(at)
-            elif "omega" in coefficient.names:
-                out[i] = coefficient.derivative("omega").value(at)
-        return out
+    def read(coefficients: Iterable[Coefficient]) -> tuple[Array, Array]:
+        """Values, and their derivatives with respect to omega."""
+        pairs = [(c.value(at), c.derivative("omega").value(at) if "omega" in c.names else 0.0) for c in coefficients]
+        values, slopes = np.array(pairs).reshape(-1, 2).T
+        return values, slopes
 
-    return _Loads(
-        direction=np.array([c.direction for c in components], dtype=float).reshape(-1, system.n),
-        harmonic=np.array([c.harmonic for c in components], dtype=float),
-        amplitude=read("amplitude", False),
-        phase=read("phase", False),
-        amplitude_slope=read("amplitude", True),
-        phase_slope=read("phase", True),
-    )
+    amplitude, amplitude_slope = read(c.amplitude for c in components)
+    phase, phase_slope = read(c.phase for c in components)
+    direction = np.array([c.direction for c in components], dtype=float).reshape(-1, system.n)
+    harmonic = np.array([c.harmonic for c in components], dtype=float)
+    return _Loads(direction, harmonic, amplitude, phase, amplitude_slope, phase_slope)
 
 
 class Field:
@@ -109,7 +102,7 @@ class Field:
         self.n = system.n
         self.mass, self.damping, self.stiffness = (np.asarray(a, dtype=float) for a in system.matrices(self.values))
         self.inverse_mass = np.linalg.inv(self.mass)
-        self.loads = _loads(system, self.values, self.omega)
+        self.loads = _loads(system, {**self.values, "omega": self.omega})
         #: laws that are evaluated, with their coefficients: all but those that are a sum of pieces
         self.smooth: list[tuple[BaseElement, Array]] = []
         self.switches: list[Switch] = []

@@ -64,7 +64,6 @@ class Passage:
     steps: list[Step] = field(default_factory=list)
     tau: list[float] = field(default_factory=list)
     states: list[Array] = field(default_factory=list)
-    evaluations: int = 0
 
 
 def _solver(rhs: Any, begin: float, y: Array, end: float, rtol: float, atol: float, first: float | None) -> DOP853:
@@ -237,7 +236,6 @@ def advance(
             break
         else:
             tau, y = solver.t, solver.y
-        out.evaluations += solver.nfev
     out.y = y
     return out
 

@@ -6,12 +6,12 @@ a safeguarded secant iteration. Every step onto the curve is Newton with the lea
 points are points like any other. With `A = [F_z, F_eta]` and its null vector `t`:
 
 - LP: the component of `t` along `eta` vanishes;
-- PD: `[F_z + 2 I, b; c^T, 0]` gives a zero last component (a multiplier is -1);
+- PD: `det (F_z + 2 I)` vanishes (a multiplier is -1);
 - NS: `|mu|^2 - 1` of one complex pair, followed by nearness;
-- BP: the same bordering of `[A; t^T]`, which has a second null vector there (with `b`, `c` from the start); the
-  direction that leaves the curve is not corrected while it is nearly singular.
+- BP: `det [A; t^T]`, which has a null vector there; the direction that leaves the curve is not corrected while it is
+  nearly singular.
 
-Kuznetsov, Elements of Applied Bifurcation Theory, chapter 10, has the bordered test functions.
+Kuznetsov, Elements of Applied Bifurcation Theory, chapter 10, has these test functions.
 """
 
 from __future__ import annotations
@@ -112,19 +112,13 @@ class Curve:
         )
 
 
-def _bordered(matrix: Callable[[CurvePoint], Array], start: CurvePoint) -> Callable[[CurvePoint], float]:
-    """Signed measure of singularity: last component of the solution of the matrix bordered by its singular vectors."""
-    left, _, right = np.linalg.svd(matrix(start))
-    b, c = left[:, -1], right[-1]
-
-    def value(point: CurvePoint) -> float:
-        a = matrix(point)
-        whole = np.block([[a, b[:, None]], [c[None, :], np.zeros((1, 1))]])
-        target = np.zeros(len(whole))
-        target[-1] = 1.0
-        return float(np.linalg.solve(whole, target)[-1])
-
-    return value
+def _determinant(kind: str, point: CurvePoint) -> float:
+    """What vanishes, changing its sign, at a bifurcation of this kind."""
+    if kind == "LP":
+        return float(point.tangent[-1])
+    if kind == "PD":
+        return float(np.linalg.det(point.transition + np.eye(len(point.transition))))
+    return float(np.linalg.det(np.vstack([point.slopes, point.tangent])))
 
 
 def _neimark_sacker(start: CurvePoint) -> Callable[[CurvePoint], float]:
@@ -145,14 +139,7 @@ def _neimark_sacker(start: CurvePoint) -> Callable[[CurvePoint], float]:
 
 
 def _test_function(kind: str, start: CurvePoint) -> Callable[[CurvePoint], float]:
-    identity = np.eye(len(start.transition))
-    if kind == "LP":
-        return lambda point: float(point.tangent[-1])
-    if kind == "PD":
-        return _bordered(lambda point: point.transition + identity, start)
-    if kind == "BP":
-        return _bordered(lambda point: np.vstack([point.slopes, point.tangent]), start)
-    return _neimark_sacker(start)
+    return _neimark_sacker(start) if kind == "NS" else lambda point: _determinant(kind, point)
 
 
 def locate_by_shooting(
@@ -300,12 +287,8 @@ def _scan(
 
 def _side(kind: str, point: CurvePoint) -> float:
     """What changes at a bifurcation of this kind, and has no pole: a sign, or for NS a number of pairs."""
-    if kind == "LP":
-        return float(np.sign(point.tangent[-1]))
-    if kind == "PD":
-        return float(np.linalg.slogdet(point.transition + np.eye(len(point.transition)))[0])
-    if kind == "BP":
-        return float(np.linalg.slogdet(np.vstack([point.slopes, point.tangent]))[0])
+    if kind != "NS":
+        return float(np.sign(_determinant(kind, point)))
     multipliers = np.linalg.eigvals(point.transition)
     return float(np.sum((np.abs(multipliers) > 1.0) & (multipliers.imag != 0.0)) // 2)
 

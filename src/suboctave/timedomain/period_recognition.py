@@ -46,13 +46,12 @@ def extents(peaks: Array, omega: float, mass: Array) -> Array:
     return np.concatenate([lengths, omega * lengths])
 
 
-def period_of(points: Array, sizes: Array, tolerance: float, longest: int | None = None) -> Repeat:
-    """The period of stroboscopic points (P, 2n); `longest` bounds it (default: what P points can show)."""
+def period_of(points: Array, sizes: Array, tolerance: float) -> Repeat:
+    """The period of stroboscopic points (P, 2n), as long as they can show."""
     if not np.isfinite(points).all():
         return Repeat(0, np.inf)
-    most = len(points) // 3
     best = np.inf
-    for n in range(1, min(most, longest or most) + 1):
+    for n in range(1, len(points) // 3 + 1):
         defect = float(np.max(np.abs(points[-2 * n :] - points[-3 * n : -n]) / sizes))
         if defect <= tolerance and _stays_apart(points, sizes, n):
             return Repeat(n, defect)
