@@ -35,7 +35,7 @@ from suboctave.model.system import System
 from suboctave.options import with_options
 from suboctave.progress import Report, reporting
 from suboctave.store.layout import parameter_column
-from suboctave.timedomain.flow import Flow, check_extent
+from suboctave.timedomain.flow import Flow, Motions, check_extent
 
 if TYPE_CHECKING:
     import pandas
@@ -188,10 +188,10 @@ def brute_force_diagram(
         name, grid, labels, points, largest, True, None if name == "omega" else at, transient, how.period_tolerance,
         how.method, how.observe, system,
     )  # fmt: skip
-    scan = _Scan(diagram, periods, how)
+    run = _Run(diagram, periods, how)
     with reporting(options.get("progress"), "brute force") as report:
         try:
-            diagram.interruption = scan.go(first, fresh, report)
+            diagram.interruption = run.go(first, fresh, report)
         except KeyboardInterrupt as cause:
             diagram.interruption = Interruption.of(cause)
     diagram.complete = diagram.interruption is None
@@ -199,7 +199,7 @@ def brute_force_diagram(
 
 
 @dataclass
-class _Scan:
+class _Run:
     """The work of one diagram; fills its `points` and `largest`."""
 
     diagram: BruteForceDiagram
@@ -208,55 +208,47 @@ class _Scan:
 
     def go(self, first: Array, fresh: Array, report: Report | None) -> Interruption | None:
         """States that are carried on from `first` (2n,), then every value anew from rest and from `fresh` (k, 2n)."""
-        d, how = self.diagram, self.how
-        carried = [label for label in d.starts if label in _CARRIED]
-        anew = [i for i, label in enumerate(d.starts) if label not in _CARRIED]
-        share = len(carried) / len(d.starts)
+        starts = self.diagram.starts
+        carried = [i for i, label in enumerate(starts) if label in _CARRIED]
+        anew = [i for i, label in enumerate(starts) if label not in _CARRIED]
+        share = len(carried) / len(starts)
         if carried:
-            flow = Flow(d.system, how.method, 1, how.steps, how.tolerance, lanes=FEW)
-            self._carry(flow, carried, first, _share(report, 0.0, share))
+            self._carry(carried, first, _share(report, 0.0, share))
         if not anew:
             return None
-        begin = np.vstack([np.zeros((1, 2 * d.system.n)), fresh]) if "rest" in d.starts else fresh
-        flow = Flow(d.system, how.method, 1, how.steps, how.tolerance)
-        return self._begin_anew(flow, anew, begin, _share(report, share, 1.0))
+        begin = np.vstack([np.zeros((1, len(first))), fresh]) if "rest" in starts else fresh
+        return self._begin_anew(anew, begin, _share(report, share, 1.0))
 
-    def _carry(self, flow: Flow, which: list[str], first: Array, report: Report | None) -> None:
+    def _carry(self, rows: list[int], first: Array, report: Report | None) -> None:
         """Carry states through the values, all directions side by side."""
-        d = self.diagram
-        count = len(d.values)
-        states = np.repeat(first[None], len(which), axis=0)
-        rows = [d.starts.index(one) for one in which]
+        d, count = self.diagram, len(self.diagram.values)
+        flow, states = self._flow(FEW), np.repeat(first[None], len(rows), axis=0)
         for step in range(count):
-            columns = [step if one == "up" else count - 1 - step for one in which]
-            motions = flow.over(states, *self._at(d.values[columns]), d.transient, measure=True, workers=1).whole()
-            for i, (row, column) in enumerate(zip(rows, columns, strict=True)):
-                d.points[row, column], d.largest[row, column] = motions.states[i], motions.peaks[i]
+            columns = [step if d.starts[row] == "up" else count - 1 - step for row in rows]
+            motions = self._over(flow, states, d.values[columns], workers=1).whole()
+            d.points[rows, columns], d.largest[rows, columns] = motions.states, motions.peaks
             # where a motion has left the range of numbers, the next value begins as the first one did
             states = np.where(motions.failed[:, None], first, motions.end)
             if report is not None:
                 report((step + 1) / count, f"{d.name} = {d.values[columns[0]]:.6g}")
 
-    def _begin_anew(self, flow: Flow, rows: list[int], begin: Array, report: Report | None) -> Interruption | None:
+    def _begin_anew(self, rows: list[int], begin: Array, report: Report | None) -> Interruption | None:
         """Every value from every state in `begin` (k, 2n); what stopped it, if anything did."""
-        d, k = self.diagram, len(begin)
-        motions = flow.over(
-            np.repeat(begin, len(d.values), axis=0),
-            *self._at(np.tile(d.values, k)),
-            skip=d.transient,
-            measure=True,
-            workers=self.how.workers,
-            report=report,
-        )
+        d, k, count = self.diagram, len(begin), len(self.diagram.values)
+        states, values = np.repeat(begin, count, axis=0), np.tile(d.values, k)
+        motions = self._over(self._flow(), states, values, workers=self.how.workers, report=report)
         for out, kept in ((d.points, motions.states), (d.largest, motions.peaks)):
-            out[rows] = kept.reshape(k, len(d.values), *kept.shape[1:])
+            out[rows] = kept.reshape(k, count, *kept.shape[1:])
         return motions.interruption
 
-    def _at(self, values: Array) -> tuple[Any, int, dict[str, Array]]:
-        """Frequency, periods and parameters of a flow."""
+    def _flow(self, lanes: int | None = None) -> Flow:
+        how = self.how
+        return Flow(self.diagram.system, how.method, 1, how.steps, how.tolerance, lanes)
+
+    def _over(self, flow: Flow, states: Array, values: Array, **options: Any) -> Motions:
         d = self.diagram
-        whole = d.transient + self.periods
-        return (values, whole, {}) if d.omega is None else (d.omega, whole, {d.name: values})
+        omega, varied = (values, {}) if d.omega is None else (d.omega, {d.name: values})
+        return flow.over(states, omega, d.transient + self.periods, varied, d.transient, measure=True, **options)
 
 
 def _share(report: Report | None, begin: float, end: float) -> Report | None:
@@ -267,11 +259,7 @@ def _share(report: Report | None, begin: float, end: float) -> Report | None:
 
 def _starts(start: str | Sequence[str]) -> list[str]:
     listed = [start] if isinstance(start, str) else list(start) if isinstance(start, Iterable) else [start]
-    for one in listed:
-        if one not in _STARTS:
-            raise InputError(
-                f"start is one of {', '.join(_STARTS)}, or several of them, not {one!r}{suggest(str(one), _STARTS)}"
-            )
-    if not listed:
-        raise InputError(f"start is one of {', '.join(_STARTS)}, or several of them, not none")
+    wrong = next((f"{one!r}{suggest(str(one), _STARTS)}" for one in listed if one not in _STARTS), None)
+    if wrong or not listed:
+        raise InputError(f"start is one of {', '.join(_STARTS)}, or several of them, not {wrong or 'none'}")
     return list(dict.fromkeys(listed))

@@ -363,16 +363,15 @@ class TwoTrajectories:
         for name, given in (("steps_per_period", self.steps_per_period), ("tolerances", self.tolerances)):
             if not isinstance(given, Sequence) or isinstance(given, str) or not given:
                 raise InputError(f"{name} must be several numbers, one for each setting, not {shortened(given)}")
-        given = self.offset if isinstance(self.offset, tuple) else (self.offset,)
-        if not given:
+        if self.offset == ():
             raise InputError("offset must be a number or several of them, not none")
-        for value in given:
-            check_numbers(offset=value)
-        check_numbers(saturation=self.saturation)
+        for offset in self.offset if isinstance(self.offset, tuple) else (self.offset,):
+            check_numbers(offset=offset)
+            if not 0.0 < offset < 1.0:
+                raise InputError(f"offset={self.offset!r} must be positive, and far below the size of the motion")
         for steps in self.steps_per_period:
             check_count("steps_per_period", steps)
-        if not all(0.0 < offset < 1.0 for offset in self.offsets):
-            raise InputError(f"offset={self.offset!r} must be positive, and far below the size of the motion")
+        check_numbers(saturation=self.saturation)
         if not 0.0 < self.saturation <= 1.0:
             raise InputError(f"saturation={self.saturation!r} must be a share of the size of the motion, up to 1")
 

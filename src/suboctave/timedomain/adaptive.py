@@ -26,7 +26,7 @@ from suboctave.timedomain.law_code import LawCode
 from suboctave.timedomain.layout import Layout, Numbers, PlacedLaw
 from suboctave.timedomain.python_callbacks import callback_shapes
 
-__all__ = ["AdaptiveMethod", "adaptive_functions"]
+__all__ = ["AdaptiveMethod"]
 
 _FIRST_STEP = 0.01
 #: what an error of a tangent vector counts for, beside one of the motion
@@ -70,14 +70,6 @@ def adaptive_rows(layout: Layout, lanes: int, count: int) -> Rows:
     return Rows(lanes, shapes)
 
 
-def adaptive_functions(layout: Layout, lanes: int, count: int) -> list[str]:
-    """The functions that integrate `lanes` trajectories of this layout, each with `count` tangent vectors."""
-    rows = adaptive_rows(layout, lanes, count)
-    follow = "follow(rows, l, at, n, count, skip, growth)" if count else ""
-    driver = _DRIVER.format(lanes=lanes, n=layout.n, corners=layout.corners, count=count, follow=follow)
-    return [_AdaptiveCode(layout, rows, count).begin(), _AdaptiveCode(layout, rows, count).attempt(), driver]
-
-
 class AdaptiveMethod(Method):
     """The compiled integrator of a layout, with `count` tangent vectors for each trajectory.
 
@@ -93,7 +85,10 @@ class AdaptiveMethod(Method):
         lanes = lanes or (16 if 16 * adaptive_rows(layout, 1, count).size <= ROOM else 8)
         super().__init__(layout, adaptive_rows(layout, lanes, count), count)
         self.samples, self.tolerance, self.transition = samples, tolerance, transition
-        self.function: Any = module_of(*adaptive_functions(layout, lanes, count)).adaptive
+        follow = "follow(rows, l, at, n, count, skip, growth)" if count else ""
+        driver = _DRIVER.format(lanes=lanes, n=layout.n, corners=layout.corners, count=count, follow=follow)
+        begin, attempt = (_AdaptiveCode(layout, self.rows, count) for _ in range(2))
+        self.function: Any = module_of(begin.begin(), attempt.attempt(), driver).adaptive
         self.begins = np.array([self.rows.begin[name] for name in VECTORS], dtype=np.int64)
         size = 2 * layout.n
         generic = np.linalg.qr(np.random.default_rng(0).normal(size=(size, size)))[0]

@@ -193,11 +193,7 @@ class Flow:
             Before any work, for shapes and values that make no sense.
         """
         periods = check_count("periods", periods)
-        x, w, varied = self._broadcast(states, omega, parameters or {})
-        total = periods * self.samples
-        skip = min(max(int(skip), 0), total)
-        check_extent(len(x), periods, len(x) * (total - skip) * 2 * self.layout.n)
-        return self._follow(x, w, varied, total, skip, measure).go(workers, report)
+        return self._run(states, omega, parameters, periods, skip, measure).go(workers, report)
 
     def onward(
         self,
@@ -214,25 +210,29 @@ class Flow:
         """
         if self.method != "accurate":
             raise InputError('pieces of a period are followed with method="accurate"')
-        x, w, varied = self._broadcast(states, omega, parameters or {})
-        at = np.broadcast_to(np.asarray(first) % self.samples, (len(x),)).astype(float)
-        return self._follow(x, w, varied, 1, 0, False, at).go(workers, None)
+        return self._run(states, omega, parameters, 1, 0, False, first).go(workers, None)
 
-    def _follow(
+    def _run(
         self,
-        states: Array,
-        omega: Array,
-        varied: Mapping[str, Array],
-        total: int,
+        states: ArrayLike,
+        omega: ArrayLike,
+        parameters: Mapping[str, ArrayLike] | None,
+        periods: int,
         skip: int,
         measure: bool,
-        first: Array | None = None,
+        first: NDArray[np.int_] | None = None,
     ) -> _Run:
-        which = np.arange(len(states)) if len(omega) > 1 else np.zeros(len(states), dtype=int)
-        numbers = self.layout.numbers(omega, varied)
+        """A run over so many periods, or from samples `first` to the next ones."""
+        x, w, varied = self._broadcast(states, omega, parameters or {})
+        count, total = len(x), 1 if first is not None else periods * self.samples
+        skip = min(max(int(skip), 0), total)
+        check_extent(count, periods, count * (total - skip) * 2 * self.layout.n)
+        which = np.arange(count) if len(w) > 1 else np.zeros(count, dtype=int)
+        numbers = self.layout.numbers(w, varied)
         rows = {name: value.reshape(numbers.count, -1) for name, value in self.integrator.numbers(numbers).items()}
-        sizes, callbacks = self.layout.sizes(numbers, states, which), PythonCallbacks(self.layout.called_back)
-        batch = Batch(rows, which, states, sizes, total, skip, measure, first, callbacks.address)
+        sizes, callbacks = self.layout.sizes(numbers, x, which), PythonCallbacks(self.layout.called_back)
+        at = None if first is None else np.broadcast_to(np.asarray(first) % self.samples, (count,)).astype(float)
+        batch = Batch(rows, which, x, sizes, total, skip, measure, at, callbacks.address)
         return _Run(self.integrator, batch, callbacks)
 
     def _broadcast(
@@ -251,8 +251,6 @@ class Flow:
                 f"states of {n} degrees of freedom have the shape ({2 * n},) or (B, {2 * n}): displacements, then "
                 f"velocities; got {x.shape}"
             )
-        sizes = {"states": len(x) if x.ndim == 2 else None, "omega": len(w) if w.ndim else None}
-        sizes |= {name: len(values) if values.ndim else None for name, values in varied.items()}
         for name, array in (("omega", w), *varied.items()):
             if array.ndim > 1 or not np.isfinite(array).all():
                 raise InputError(f"{name} must be a finite number or one for each trajectory, got shape {array.shape}")
@@ -260,11 +258,13 @@ class Flow:
             raise InputError("omega must be positive: it sets the scale of time")
         if not np.isfinite(x).all():
             raise InputError("the states have entries that are not finite")
-        counts = {size for size in sizes.values() if size is not None}
+        sizes = {"states": len(x)} if x.ndim == 2 else {}
+        sizes |= {name: len(array) for name, array in (("omega", w), *varied.items()) if array.ndim}
+        counts = set(sizes.values()) or {1}
         if len(counts) > 1 or 0 in counts:
-            given = ", ".join(f"{name}: {size}" for name, size in sizes.items() if size is not None)
+            given = ", ".join(f"{name}: {size}" for name, size in sizes.items())
             raise InputError(f"there must be as many states, frequencies and parameters; got {given}")
-        count = counts.pop() if counts else 1
+        count = counts.pop()
         sets = count if w.ndim or any(values.ndim for values in varied.values()) else 1
         return (
             np.broadcast_to(x, (count, 2 * n)),
@@ -278,13 +278,7 @@ class _Run:
 
     def __init__(self, method: Method, batch: Batch, callbacks: PythonCallbacks) -> None:
         self.method, self.batch, self.callbacks = method, batch, callbacks
-        n, count, kept, lanes, tangents = (
-            method.layout.n,
-            len(batch.states),
-            batch.kept,
-            method.rows.lanes,
-            method.count,
-        )
+        n, count, kept, lanes = method.layout.n, len(batch.states), batch.kept, method.rows.lanes
         self.motions = Motions(
             states=np.full((count, kept, 2 * n), np.nan),
             peaks=np.full((count, kept * batch.measure, n), np.nan),
@@ -292,8 +286,8 @@ class _Run:
             failed=np.zeros(count, dtype=bool),
             unsettled=np.zeros(count),
             finished=np.zeros(count, dtype=bool),
-            growth=np.full((count, kept * (tangents > 0), tangents + 1), np.nan),
-            tangents=np.full((count, 2 * n, tangents), np.nan),
+            growth=np.full((count, kept * (method.count > 0), method.count + 1), np.nan),
+            tangents=np.full((count, 2 * n, method.count), np.nan),
         )
         self.groups = [range(first, min(first + lanes, count)) for first in range(0, count, lanes)]
         self.done = [0.0] * len(self.groups)

@@ -112,12 +112,14 @@ class _Watch:
         self._repeats = np.zeros(len(self.active), dtype=int)
 
     def _margin(self, z: Array) -> Array:
-        sign = np.where(self.active, 1.0, -1.0)
-        return (sign if z.ndim == 1 else sign[:, None]) * self.model.distances(z)
+        return self._signed(self.model.distances(z))
 
     def _margin_rate(self, z: Array) -> Array:
+        return self._signed(self.model.approach(z))
+
+    def _signed(self, values: Array) -> Array:
         sign = np.where(self.active, 1.0, -1.0)
-        return (sign if z.ndim == 1 else sign[:, None]) * self.model.approach(z)
+        return (sign if values.ndim == 1 else sign[:, None]) * values
 
     def change(self, tau: float, switch: int) -> Crossing:
         """Note that `switch` changes at `tau`."""

@@ -25,9 +25,9 @@ from numpy.typing import ArrayLike
 from suboctave.errors import ConvergenceError, InputError, suggest
 from suboctave.model import System
 from suboctave.model.inputs import check_count, observed_dof
-from suboctave.timedomain.field import Array, Field, scaled_field
+from suboctave.timedomain.field import Array, Field, default_lengths, scaled_field
 from suboctave.timedomain.shooting import PeriodicSolution, finish
-from suboctave.timedomain.trajectory import flow, measured_lengths
+from suboctave.timedomain.trajectory import flow
 
 __all__ = ["Curve", "CurvePoint", "locate_by_shooting"]
 
@@ -173,7 +173,7 @@ def locate_by_shooting(
     model = scaled_field(system, start, omega, values)
     # One pass for the size of the motion, then fixed scales: the secant iteration needs one measure of length.
     _, _, passage = flow(model, 0.0, start / model.scale, 2.0 * np.pi * periods, 1e-6)
-    model.rescale(measured_lengths(model, passage))
+    model.rescale(default_lengths(model, passage.extent * model.scale))
     curve = Curve(model, periods, rtol, tol, kind == "BP", budget)
     point = curve.onto(np.append(start / model.scale, 1.0), None)
     point, test, steps = _drive(curve, point, kind, max_step, max_iterations, reach)

@@ -109,15 +109,20 @@ class MultipleShooting:
         `along` (B, N 2n + 1): the sense of the tangents. Raises KeyboardInterrupt where it was interrupted.
         """
         y, w = states.copy(), omega.copy()
-        count = len(y)
+        count, _, m = y.shape
         converged, gone = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
         residual = np.full(count, np.inf)
         last = np.full(count, np.inf)
+
+        def linearised(which: NDArray[np.int_], width: float = _WIDTH) -> tuple[Array, Array, Array]:
+            own = {name: values[which] for name, values in parameters.items()}
+            return self._linearised(y[which], w[which], own, sizes[which], omega[which], width)
+
         for _ in range(iterations):
             now = np.flatnonzero(~converged & ~gone)
             if not now.size:
                 break
-            jacobian, defect, _ = self._linearised(y[now], w[now], _of(parameters, now), sizes[now], omega[now])
+            jacobian, defect, _ = linearised(now)
             usable = np.isfinite(jacobian).all(axis=(1, 2)) & np.isfinite(defect).all(axis=1)
             gone[now[~usable]] = True
             now, jacobian, defect = now[usable], jacobian[usable], defect[usable]
@@ -137,29 +142,14 @@ class MultipleShooting:
             settled = (length >= 0.5 * last[now]) & (length <= _CORRECTION) & (residual[now] <= _RESIDUAL)
             converged[now[good & ((length <= _SMALL) | settled)]] = True
             last[now] = length
-        converged |= ~gone & (last <= _CORRECTION) & (residual <= _RESIDUAL)
-        return self._finish(y, w, converged & ~gone, residual, parameters, sizes, omega, along)
-
-    def _finish(
-        self,
-        y: Array,
-        w: Array,
-        converged: NDArray[np.bool_],
-        residual: Array,
-        parameters: Mapping[str, Array],
-        sizes: Array,
-        reference: Array,
-        along: Array | None,
-    ) -> ShotMotions:
-        count, _, m = y.shape
-        tangent = np.full((count, self.pieces * m + 1), np.nan)
-        border = np.full(count, np.nan)
-        whole, rough = np.full((count, m, m), np.nan), np.full((count, m, m), np.nan)
+        converged |= (last <= _CORRECTION) & (residual <= _RESIDUAL)
+        converged &= ~gone
+        tangent, border = np.full((count, self.pieces * m + 1), np.nan), np.full(count, np.nan)
+        whole, rough = np.full((2, count, m, m), np.nan)
         now = np.flatnonzero(converged)
         if now.size:
-            at = (y[now], w[now], _of(parameters, now), sizes[now], reference[now])
-            jacobian, defect, narrow = self._linearised(*at)
-            wide = self._linearised(*at, width=2.0 * _WIDTH)[2]
+            jacobian, defect, narrow = linearised(now)
+            wide = linearised(now, 2.0 * _WIDTH)[2]
             residual[now] = np.abs(defect).max(axis=1)
             rough[now] = _product(narrow)
             whole[now] = _product((4.0 * narrow - wide) / 3.0)
@@ -177,7 +167,7 @@ class MultipleShooting:
         parameters: Mapping[str, Array],
         sizes: Array,
         reference: Array,
-        width: float = _WIDTH,
+        width: float,
     ) -> tuple[Array, Array, Array]:
         """Jacobian (B, N m, N m + 1), defect (B, N m), transition matrices of the pieces (B, N, m, m), scaled."""
         count, pieces, m = y.shape
@@ -208,10 +198,6 @@ class MultipleShooting:
             jacobian[:, rows, -1] = slopes[:, k, m]
         defect = ends[:, :, -1] - np.roll(y, -1, axis=1) / sizes[:, None, :]
         return jacobian, defect.reshape(count, -1), transition
-
-
-def _of(parameters: Mapping[str, Array], which: NDArray[np.int_]) -> dict[str, Array]:
-    return {name: values[which] for name, values in parameters.items()}
 
 
 def _product(pieces: Array) -> Array:

@@ -30,7 +30,7 @@ from suboctave.timedomain.law_code import LawCode
 from suboctave.timedomain.layout import Layout, Numbers, PlacedLaw
 from suboctave.timedomain.python_callbacks import callback_shapes
 
-__all__ = ["NewmarkMethod", "newmark_function"]
+__all__ = ["NewmarkMethod"]
 
 _MOST_ITERATIONS = 30
 
@@ -60,7 +60,7 @@ class NewmarkMethod(Method):
         super().__init__(layout, newmark_rows(layout, lanes))
         self.steps, self.tolerance = steps, tolerance
         self.stride, self.effort = steps // samples, steps
-        self.function: Any = module_of(newmark_function(layout, lanes)).newmark
+        self.function: Any = module_of(_NewmarkCode(layout, self.rows).function()).newmark
         self.waves = layout.wave_table(steps)
 
     def numbers(self, numbers: Numbers) -> dict[str, Array]:
@@ -100,11 +100,6 @@ class NewmarkMethod(Method):
     def results(self, group: Group) -> dict[str, Array]:
         """See `Method.results`; of each the steps whose equations were not solved to the tolerance."""
         return {"end": np.concatenate([group.row("x"), group.row("v")]).T, "unsettled": group.row("bad")[0]}
-
-
-def newmark_function(layout: Layout, lanes: int) -> str:
-    """The function that integrates `lanes` trajectories of this layout."""
-    return _NewmarkCode(layout, newmark_rows(layout, lanes)).function()
 
 
 class _NewmarkCode(LawCode):

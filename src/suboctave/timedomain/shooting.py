@@ -16,9 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 from suboctave.errors import ConvergenceError
 from suboctave.model import System
 from suboctave.model.inputs import check_count, observed_dof
-from suboctave.timedomain.field import Array, Field, scaled_field
+from suboctave.timedomain.field import Array, Field, default_lengths, scaled_field
 from suboctave.timedomain.integrator import Passage, advance
-from suboctave.timedomain.trajectory import flow, largest_displacement, measured_lengths
+from suboctave.timedomain.trajectory import flow, largest_displacement
 
 __all__ = ["PeriodicSolution", "shoot"]
 
@@ -102,7 +102,7 @@ def shoot(
     for iteration in range(max_iterations):
         # The size of the motion is known only now; after the first pass it hardly changes.
         old = model.scale
-        model.rescale(measured_lengths(model, passage))
+        model.rescale(default_lengths(model, passage.extent * model.scale))
         ratio = old / model.scale
         defect, transition = defect * ratio, transition * ratio[:, None] / ratio
         residual = float(np.max(np.abs(defect)))

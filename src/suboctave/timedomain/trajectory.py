@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from suboctave.errors import InputError
 from suboctave.model import System
-from suboctave.timedomain.field import Array, Field, default_lengths, scaled_field
+from suboctave.timedomain.field import Array, Field, scaled_field
 from suboctave.timedomain.integrator import Passage, advance, reach
 
 __all__ = ["Contact", "Trajectory", "integrate", "largest_displacement", "state_transition"]
@@ -192,8 +192,3 @@ def _extreme(model: Field, passage: Passage, i: int, at: float, dof: int) -> flo
             break
         at -= speed / rate
     return float(z[dof])
-
-
-def measured_lengths(model: Field, passage: Passage) -> Array:
-    """Lengths (n,) from the extent of a motion; see `field.default_lengths`."""
-    return default_lengths(model, passage.extent * model.scale)
