@@ -97,12 +97,9 @@ def plot_boundaries(
     Others as `suboctave.plot`. Raises InputError for what cannot be drawn.
     """
     several: list[Any] = list(curves) if isinstance(curves, list | tuple) else [curves]
-    sheet = style.sheet_of(size)
     drawing = boundary_drawing(several, x=x, y=y, labels=labels, view=view, projected=projected)
     drawing.frames[0].title = plain(title or "")
-    if sheet.named:  # a named size is a width: what stands above the frame adds height
-        drawing.legend = "grow"
-    return figure_of(drawing, sheet, path)
+    return figure_of(drawing, style.sheet_of(size), path)
 
 
 def boundary_drawing(
@@ -129,9 +126,9 @@ def boundary_drawing(
     pens = boundary_styles(group, names)
     limits = axes.limits(group, _MARGIN, _MARGIN)
     spread = (limits[0][1] - limits[0][0], limits[1][1] - limits[1][0])
-    shaded = shade(heads, axes.names, axes.factors)
-    entries = {region.name: Entry(patch=region.colour) for region in shaded}
-    frame, verdicts, hollow = Frame([*shaded]), set[bool | None](), False
+    frame, verdicts, hollow = Frame(), set[bool | None](), False
+    for region in shade(heads, axes.names, axes.factors):
+        frame.add(region, region.name)
     earlier: dict[Pen, list[np.ndarray]] = {}
     for dataset, name, pen in zip(group, names, pens, strict=True):
         seen = {None: ("curve", name, name), True: ("border", name, name), False: ("within", f"{name}, {WITHIN}", name)}
@@ -145,16 +142,16 @@ def boundary_drawing(
             role, words = ("along-hollow", f"{name}, {SUBCRITICAL}") if below[first] else ("along", "")
             line = whole.at[:, first : last + 1]
             frame.items.append(Beads(line, mark, places, role=role, name=words, group=name))
-        entries[name] = Entry(pen.along(None), _small_mark(kind_of(dataset), pen, hollow=False))
-    entries |= verdict_entries(verdicts)
+        frame.entries[name] = Entry(pen.along(None), _small_mark(kind_of(dataset), pen, hollow=False))
+    frame.entries |= verdict_entries(verdicts)
     if hollow:
-        entries[SUBCRITICAL] = Entry(mark=_small_mark("PD", style.ONE_CURVE, hollow=True))
+        frame.entries[SUBCRITICAL] = Entry(mark=_small_mark("PD", style.ONE_CURVE, hollow=True))
     for dataset in group:
         frame.items += event_markers(dataset, axes, axes.marked(dataset))
-    entries |= event_entries(kind for data in group for kind in data["event_kind"].to_numpy()[axes.marked(data)])
+    frame.entries |= event_entries(kind for data in group for kind in data["event_kind"].to_numpy()[axes.marked(data)])
     frame.labels = _names_of_events(group, axes)
     lows_and_highs = zip(axes.labels(group), limits, strict=True)
-    return Drawing([Axis(label, *own) for label, own in lows_and_highs], [frame], entries)
+    return Drawing([Axis(label, *own) for label, own in lows_and_highs], [frame])
 
 
 # --------------------------------------------------------------------------------------------------------------- curves

@@ -169,36 +169,52 @@ class Axis:
 
 @dataclass
 class Frame:
-    """What stands in one frame, with a text above."""
+    """What stands in one frame, with a text above, and its entries in the legend."""
 
     items: list[Item] = field(default_factory=list)
     labels: list[Label] = field(default_factory=list)
     title: str = ""
+    entries: dict[str, Entry] = field(default_factory=dict)
+
+    def add(self, item: Item, legend: str = "") -> None:
+        """Add an item, with a name in the legend where it has one there: shown as the item is drawn."""
+        self.items.append(item)
+        if not legend:
+            return
+        match item:
+            case Region() | Band():
+                self.entries[legend] = Entry(patch=item.colour)
+            case Polyline() | Guide():
+                self.entries[legend] = Entry(item.pen)
+            case Markers() | Beads():
+                self.entries[legend] = Entry(mark=item.mark)
 
 
 @dataclass
 class Drawing:
     """One or several frames on the same axes, with one legend.
 
-    `legend`: "free" is inside the frame where there is room, else above; "outside" above in any case; "grow" like
-    "free", but the page becomes higher; "beside" and "below" the frame, without a box. `title` stands above all frames;
-    titles of frames are `small` where they are captions.
+    `legend`: "free" is inside the frame where there is room, else above; "outside" above in any case; "beside" and
+    "below" the frame, without a box. `by_kind`: curves first in it, then kinds in the order of their table. `title`
+    stands above all frames; titles of frames are `small` where they are captions.
     """
 
     axes: Sequence[Axis]
-    frames: list[Frame] = field(default_factory=lambda: [Frame()])
-    entries: dict[str, Entry] = field(default_factory=dict)
+    frames: list[Frame]
     title: str = ""
     columns: int = 1
     legend: str = "free"
+    by_kind: bool = False
     grid: bool = True
     small: bool = False
     #: of a drawing in space: degrees above the floor, and around the vertical axis
     seen_from: tuple[float, float] = (24.0, -58.0)
 
-    def add(self, *items: Item) -> None:
-        """Add to what is drawn in the first frame."""
-        self.frames[0].items += items
+    @property
+    def entries(self) -> dict[str, Entry]:
+        """What the legend shows, by name."""
+        every = {name: entry for frame in self.frames for name, entry in frame.entries.items()}
+        return ordered(every) if self.by_kind else every
 
 
 def extent(items: Iterable[Item]) -> tuple[np.ndarray, np.ndarray]:

@@ -10,29 +10,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
 from suboctave.errors import InputError, chosen_dof, suggest
+from suboctave.options import with_options
 from suboctave.pictures import style
-from suboctave.pictures.drawing import (
-    Axis,
-    Band,
-    Drawing,
-    Entry,
-    Frame,
-    Guide,
-    Markers,
-    Polyline,
-    Raster,
-    dot,
-    ordered,
-    plain,
-)
+from suboctave.pictures.drawing import Axis, Band, Entry, Frame, Guide, Markers, Polyline, Raster, dot, plain
 from suboctave.pictures.layers import check_count
-from suboctave.pictures.options import Coordinates, View, as_multiple, shown_multiple
-from suboctave.pictures.paper import figure_of
+from suboctave.pictures.options import Coordinates, PageOptions, View, as_multiple, shown_multiple
+from suboctave.pictures.paper import single
 from suboctave.pictures.response import datasets_of, response_frame
 from suboctave.pictures.style import Mark, Pen, period_colour, period_name, places_among, rgb, tinted
 
@@ -41,62 +29,57 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-Size = str | tuple[float, float]
 _POINTING = {"up": "^", "down": "v", "rest": "o"}
 #: share of the axis beyond what is drawn
 _MARGIN = 0.02
+#: of what does not repeat, left the range or is missing: what it is called, its colour in a plane of states
+_OTHER = {-1: ("aperiodic", "#e3e3e3"), -2: ("left the range", "#d55e00"), -3: ("not computed", "#ffffff")}
+#: hatched besides, so that nobody takes it for a motion of period T
+_APERIODIC = -1
 
 
+@with_options(PageOptions)
 def plot_trajectory(
     trajectory: xarray.Dataset,
     path: str | Path | None = None,
     *,
     dof: int | None = None,
     quantity: str = "displacement",
-    title: str | None = None,
-    size: Size = (7.2, 3.2),
+    **page: Unpack[PageOptions],
 ) -> Figure:
     """The displacement (or "velocity") of one degree of freedom over time, instants of phase 0 marked."""
     check_contents(trajectory, "trajectory")
-    if quantity not in ("displacement", "velocity"):
-        raise InputError(f"unknown quantity {quantity!r}{suggest(str(quantity), ['displacement', 'velocity'])}")
+    check_quantity(quantity, ("displacement", "velocity"))
     dof = checked_dof(trajectory, dof)
     time = trajectory["time"].to_numpy() * float(trajectory.attrs["omega"]) / (2.0 * np.pi)
     at = np.array([time, trajectory[quantity].to_numpy()[:, dof]])
     instants = at[:, :: int(trajectory.attrs["steps_per_period"])]
     line = Polyline(at, Pen(style.INK), role="motion")
     strobe = Markers(instants, dot(style.CURVE_COLOURS[0], 3.0), cut=True, role="strobe", layer=4.0)
-    axes = (
-        Axis(r"time in load periods, $t/T$", time[0], time[-1]),
-        Axis(symbol_of(trajectory, dof, int(quantity == "velocity"))),
-    )
-    frame = Frame([line, strobe], title=style.checked_text(title))
-    return figure_of(Drawing(axes, [frame]), style.sheet_of(size), path)
+    across = Axis(r"time in load periods, $t/T$", time[0], time[-1])
+    upwards = Axis(symbol_of(trajectory, dof, int(quantity == "velocity")))
+    return single(Frame([line, strobe]), (across, upwards), page, path, (7.2, 3.2))
 
 
+@with_options(PageOptions)
 def plot_sections(
-    sections: xarray.Dataset,
-    path: str | Path | None = None,
-    *,
-    dof: int | None = None,
-    title: str | None = None,
-    size: Size = (5.2, 4.6),
+    sections: xarray.Dataset, path: str | Path | None = None, *, dof: int | None = None, **page: Unpack[PageOptions]
 ) -> Figure:
     """Stroboscopic points in the plane of displacement and velocity of one degree of freedom, coloured by period."""
     check_contents(sections, "poincare sections")
     dof = checked_dof(sections, dof)
     at = np.array([sections[name].to_numpy()[..., dof] for name in ("displacement", "velocity")])
-    frame, entries = Frame(title=style.checked_text(title)), {}
-    periods = sections["period"].to_numpy()
+    frame, periods = Frame(), sections["period"].to_numpy()
     for period in sorted(set(periods.tolist()), key=lambda p: (p != 0, p)):
         last = slice(-period, None) if period else slice(None)
         chosen = at[:, np.flatnonzero(periods == period), last].reshape(2, -1)
-        frame.items.append(_points(chosen, period, 4.0 if period else 0.8, f"period {period}"))
-        entries[_name(period)] = Entry(mark=dot(_colour(period)))
+        frame.add(_points(chosen, period, 4.0 if period else 0.8, f"period {period}"))
+        frame.entries[_name(period)] = Entry(mark=dot(_colour(period)))
     axes = [Axis(symbol_of(sections, dof, order)) for order in (0, 1)]
-    return figure_of(Drawing(axes, [frame], ordered(entries)), style.sheet_of(size), path)
+    return single(frame, axes, page, path, (5.2, 4.6), by_kind=True)
 
 
+@with_options(PageOptions)
 def plot_brute_force(
     diagram: xarray.Dataset,
     path: str | Path | None = None,
@@ -105,8 +88,7 @@ def plot_brute_force(
     quantity: str = "amplitude",
     starts: Sequence[str] | None = None,
     dof: int | None = None,
-    title: str | None = None,
-    size: Size = (6.4, 4.2),
+    **page: Unpack[PageOptions],
 ) -> Figure:
     """The motions over the parameter that was varied, with branches beneath if any are given.
 
@@ -128,8 +110,7 @@ def plot_brute_force(
         For what cannot be drawn, before anything is.
     """
     check_contents(diagram, "brute force")
-    if quantity not in ("amplitude", "section"):
-        raise InputError(f"unknown quantity {quantity!r}{suggest(str(quantity), ['amplitude', 'section'])}")
+    check_quantity(quantity, ("amplitude", "section"))
     if curves is not None and quantity != "amplitude":
         raise InputError('curves= are drawn with quantity="amplitude"')
     known = [str(name) for name in diagram["start"].to_numpy()]
@@ -140,21 +121,19 @@ def plot_brute_force(
     dof = checked_dof(diagram, dof)
     varied = str(diagram.attrs["varied"])
     values = diagram["value"].to_numpy()
-    margin = _MARGIN * (np.ptp(values) or abs(values[0]) or 1.0)
-    low, high = float(values.min() - margin), float(values.max() + margin)
-    frame, entries = _beneath(curves, varied, View(xlim=(low, high)))
-    marks: dict[str, Entry] = {}
-    for start in shown:
-        marks |= _add_motions(frame, diagram.isel(start=known.index(start)), start, dof, quantity == "section")
+    low, high = _limits(values)
+    frame = _beneath(curves, varied, View(xlim=(low, high)))
     # beside curves, whose periods have the same names, marks say that they are motions in time
-    entries |= {f"{name}, in time" if curves is not None else name: mark for name, mark in marks.items()}
+    suffix = "" if curves is None else ", in time"
+    for start in shown:
+        _add_motions(frame, diagram.isel(start=known.index(start)), start, dof, quantity == "section", suffix)
     symbol = symbol_of(diagram, dof, 0).strip("$")
     upwards = rf"$\max\,|{symbol}|$" if quantity == "amplitude" else rf"${symbol}(t_k)$, stroboscopic"
     across = Axis(r"$\omega$" if varied == "omega" else plain(varied), low, high)
-    frame.title = style.checked_text(title)
-    return figure_of(Drawing((across, Axis(upwards)), [frame], ordered(entries)), style.sheet_of(size), path)
+    return single(frame, (across, Axis(upwards)), page, path, (6.4, 4.2), by_kind=True)
 
 
+@with_options(PageOptions)
 def plot_stepped_sine(
     test: xarray.Dataset,
     path: str | Path | None = None,
@@ -165,8 +144,7 @@ def plot_stepped_sine(
     dof: int | None = None,
     xlim: Sequence[float] | None = None,
     ylim: Sequence[float] | None = None,
-    title: str | None = None,
-    size: Size = (6.4, 4.2),
+    **page: Unpack[PageOptions],
 ) -> Figure:
     """The modulus of a component at each step: upward and downward triangles, coloured by the period of the motion.
 
@@ -193,55 +171,52 @@ def plot_stepped_sine(
     limits = View(xlim=xlim, ylim=ylim)
     values = _component(test, harmonic, dof)
     omega, periods = test["omega"].to_numpy(), test["period"].to_numpy()
-    every = np.concatenate([omega, *(one.omega for one in listed)])
-    margin = _MARGIN * (np.ptp(every) or abs(every[0]))
-    low, high = limits.xlim or (float(every.min() - margin), float(every.max() + margin))
+    low, high = limits.xlim or _limits(np.concatenate([omega, *(one.omega for one in listed)]))
     shown = View("harmonic", harmonic, None, dof, xlim=(low, high), ylim=limits.ylim)
-    frame, entries = _beneath(curves, "omega", shown)
+    frame = _beneath(curves, "omega", shown)
     for s, direction in enumerate(test["direction"].to_numpy()):
         for period in sorted({int(p) for p in periods[s] if p >= 0}, key=lambda p: (p == 0, p)):
             here = periods[s] == period
             name = "not settled" if period == 0 else _name(period)
             mark = Mark(_POINTING.get(str(direction), "s"), 3.6, "none", _colour(period), 0.8)
             at = np.array([omega[here], values[s][here]])
-            frame.items.append(Markers(at, mark, cut=True, role=f"{direction} {name}", layer=4.0))
-            entries[f"{name}, stepped {direction}"] = Entry(mark=mark)
+            marks = Markers(at, mark, cut=True, role=f"{direction} {name}", layer=4.0)
+            frame.add(marks, f"{name}, stepped {direction}")
     for one, colour in zip(listed, style.CURVE_COLOURS[3:] * len(listed), strict=False):
-        mark = Mark("+", 5.0, colour, colour)
         at = np.array([one.omega, one.amplitude])
-        frame.items.append(Markers(at, mark, cut=True, role="measured", layer=4.2))
-        entries[plain(one.label)] = Entry(mark=mark)
+        marks = Markers(at, Mark("+", 5.0, colour, colour), cut=True, role="measured", layer=4.2)
+        frame.add(marks, plain(one.label))
     symbol = f"X_{{{shown_multiple(harmonic)}}}" + ("" if test.attrs["dofs"] == 1 else f"^{{({dof})}}")
     axes = Axis(r"$\omega$", low, high), Axis(f"$|{symbol}|$", *(limits.ylim or (0.0, None)))
-    frame.title = style.checked_text(title)
-    return figure_of(Drawing(axes, [frame], ordered(entries)), style.sheet_of(size), path)
+    return single(frame, axes, page, path, (6.4, 4.2), by_kind=True)
 
 
-def _beneath(curves: Any, x: str, view: View) -> tuple[Frame, dict[str, Entry]]:
-    """The frame with branches over `x`, if any are given, and their entries in the legend."""
-    if curves is None:
-        return Frame(), {}
-    return response_frame(datasets_of(curves, view), Coordinates((x, None), view))
+def _limits(values: np.ndarray) -> tuple[float, float]:
+    """The limits of an axis that shows values, with a margin."""
+    margin = _MARGIN * (np.ptp(values) or abs(values[0]) or 1.0)
+    return float(values.min() - margin), float(values.max() + margin)
 
 
-def _add_motions(frame: Frame, row: xarray.Dataset, start: str, dof: int, sections: bool) -> dict[str, Entry]:
-    """Add the motions of one way to start, their amplitudes or their `sections`, and give their entries."""
-    entries: dict[str, Entry] = {}
+def _beneath(curves: Any, x: str, view: View) -> Frame:
+    """The frame with branches over `x`, if any are given."""
+    return Frame() if curves is None else response_frame(datasets_of(curves, view), Coordinates((x, None), view))
+
+
+def _add_motions(frame: Frame, row: xarray.Dataset, start: str, dof: int, sections: bool, suffix: str) -> None:
+    """Add the motions of one way to start, their amplitudes or their `sections`; `suffix` to their names."""
     values, periods = row["value"].to_numpy(), row["period"].to_numpy()
     table = row["displacement" if sections else "largest"].to_numpy()[..., dof]
     for period in sorted({int(p) for p in periods if p >= 0}):
-        here, role = np.flatnonzero(periods == period), f"{start} {_name(period)}"
+        here, role, name = np.flatnonzero(periods == period), f"{start} {_name(period)}", _name(period) + suffix
         known = table[here][:, -period:] if period else table[here]
         if sections:
             at = np.array([np.repeat(values[here], known.shape[1]), known.ravel()])
-            frame.items.append(_points(at, period, 1.8 if period else 0.9, role))
-            mark = dot(_colour(period))  # large enough for its colour to be seen
+            frame.add(_points(at, period, 1.8 if period else 0.9, role))
+            frame.entries[name] = Entry(mark=dot(_colour(period)))  # large enough for its colour to be seen
         else:
             mark = Mark(_POINTING.get(start, "s"), 3.2, "none", _colour(period), 0.7)
             at = np.array([values[here], known.max(axis=1)])
-            frame.items.append(Markers(at, mark, cut=True, role=role, layer=4.0))
-        entries[_name(period)] = Entry(mark=mark)
-    return entries
+            frame.add(Markers(at, mark, cut=True, role=role, layer=4.0), name)
 
 
 def _points(at: np.ndarray, period: int, size: float, role: str) -> Markers:
@@ -294,6 +269,12 @@ def check_contents(dataset: Any, contents: str) -> None:
         )
 
 
+def check_quantity(quantity: str, known: Sequence[str]) -> None:
+    """InputError for a quantity that is not among those known."""
+    if quantity not in known:
+        raise InputError(f"unknown quantity {quantity!r}{suggest(str(quantity), known)}")
+
+
 def checked_dof(dataset: xarray.Dataset, dof: int | None) -> int:
     """The degree of freedom that is drawn, default the observed one; InputError where there is none."""
     return chosen_dof(dof, int(dataset.attrs["observed"]), int(dataset.attrs["dofs"]))
@@ -307,75 +288,62 @@ _GREYS = (0.72, 0.15, 0.45, 0.85)
 #: colours of growth, from none to the largest; of cells that nothing is known of
 _GROWTH, _UNKNOWN = ("#dbe9f4", "#4292c6", "#08306b"), "#dadada"
 _LINES = (style.INK, "#D55E00", "#009E73", "#E69F00")
-#: hatched besides, so that nobody takes it for a motion of period T
-_APERIODIC = -1
-_OTHER = {_APERIODIC: ("aperiodic", "#e3e3e3"), -2: ("left the range", "#d55e00"), -3: ("not computed", "#ffffff")}
 
 
+@with_options(PageOptions)
 def plot_lyapunov(
-    exponents: xarray.Dataset,
-    path: str | Path | None = None,
-    *,
-    count: int | None = None,
-    title: str | None = None,
-    size: Size = (6.0, 3.6),
+    exponents: xarray.Dataset, path: str | Path | None = None, *, count: int | None = None, **page: Unpack[PageOptions]
 ) -> Figure:
     """Running averages over the periods, with the result and a band of two standard errors; the first `count`."""
     check_contents(exponents, "lyapunov exponents")
     running = exponents["running"].to_numpy()
     shown = running.shape[1] if count is None else min(int(count), running.shape[1])
     period = np.arange(1, len(running) + 1)
-    frame, entries = Frame([Guide(0.0, Pen(style.SOFT, 0.6), layer=1.0)], title=style.checked_text(title)), {}
+    frame = Frame([Guide(0.0, Pen(style.SOFT, 0.6), layer=1.0)])
     for i in range(shown):
         colour = style.CURVE_COLOURS[i % len(style.CURVE_COLOURS)]
         value, error = (float(exponents[name].to_numpy()[i]) for name in ("exponents", "standard_errors"))
         if np.isfinite(error):
-            frame.items.append(Band(value - 2.0 * error, value + 2.0 * error, tinted(colour, 0.7), layer=2.0))
-        frame.items.append(Guide(value, Pen(colour, 0.5)))
+            frame.add(Band(value - 2.0 * error, value + 2.0 * error, tinted(colour, 0.7), layer=2.0))
+        frame.add(Guide(value, Pen(colour, 0.5)))
         line = Polyline(np.array([period, running[:, i]]), Pen(colour), role=f"exponent {i}", layer=4.0)
-        frame.items.append(line)
-        entries[rf"$\lambda_{{{i + 1}}}$ = {value:.4g} ± {error:.1g}"] = Entry(line.pen)
+        frame.add(line, rf"$\lambda_{{{i + 1}}}$ = {value:.4g} ± {error:.1g}")
     axes = Axis("load periods averaged over", 1.0, len(running), logarithmic=True), Axis(_EXPONENT)
-    return figure_of(Drawing(axes, [frame], entries), style.sheet_of(size), path)
+    return single(frame, axes, page, path, (6.0, 3.6))
 
 
+@with_options(PageOptions)
 def plot_separation(
-    separation: xarray.Dataset,
-    path: str | Path | None = None,
-    *,
-    most: int = 20,
-    title: str | None = None,
-    size: Size = (6.0, 3.8),
+    separation: xarray.Dataset, path: str | Path | None = None, *, most: int = 20, **page: Unpack[PageOptions]
 ) -> Figure:
     """Distances of two trajectories over time for at most `most` settings, and the mean rate as a line."""
     check_contents(separation, "separation")
     time, distance = separation["time"].to_numpy(), separation["distance"].to_numpy()
     which = np.unique(np.linspace(0, len(distance) - 1, max(1, int(most))).astype(int))
-    frame, thin = Frame(title=style.checked_text(title)), Pen(style.SOFT, 0.5)
-    frame.items += [Polyline(np.array([time, distance[i]]), thin, layer=2.0) for i in which]
-    entries = {f"{len(which)} of {len(distance)} settings": Entry(thin)}
+    frame = Frame()
+    for i in which:
+        thin = Polyline(np.array([time, distance[i]]), Pen(style.SOFT, 0.5), layer=2.0)
+        frame.add(thin, f"{len(which)} of {len(distance)} settings")
     exponent, spread = separation.attrs["exponent"], separation.attrs["spread"]
     if np.isfinite(exponent):
         typical = int(np.nanargmin(np.abs(separation["rate"].to_numpy() - exponent)))
         begin = float(np.median(separation["offset"].to_numpy())) * float(separation.attrs["omega"])
         line = begin * np.exp(exponent * time)
         keep = line <= np.max(distance)
-        pens = Pen(style.INK), Pen(style.CURVE_COLOURS[0], 1.3)
-        frame.items.append(Polyline(np.array([time, distance[typical]]), pens[0]))
-        frame.items.append(Polyline(np.array([time[keep], line[keep]]), pens[1], layer=4.0))
-        entries["the setting nearest to the mean"] = Entry(pens[0])
-        entries[rf"$\lambda$ = {exponent:.3f}, one setting ± {spread:.2g}"] = Entry(pens[1])
+        frame.add(Polyline(np.array([time, distance[typical]]), Pen(style.INK)), "the setting nearest to the mean")
+        mean = Polyline(np.array([time[keep], line[keep]]), Pen(style.CURVE_COLOURS[0], 1.3), layer=4.0)
+        frame.add(mean, rf"$\lambda$ = {exponent:.3f}, one setting ± {spread:.2g}")
     axes = Axis("time", time[0], time[-1]), Axis(r"distance $\delta$", logarithmic=True)
-    return figure_of(Drawing(axes, [frame], entries), style.sheet_of(size), path)
+    return single(frame, axes, page, path, (6.0, 3.8))
 
 
+@with_options(PageOptions)
 def plot_lyapunov_map(
     chart: xarray.Dataset,
     path: str | Path | None = None,
     *,
     lines: Sequence[tuple[str, np.ndarray, np.ndarray]] = (),
-    title: str | None = None,
-    size: Size = (6.4, 4.2),
+    **page: Unpack[PageOptions],
 ) -> Figure:
     """Largest exponents in colour where the motion is chaotic, white where it is not, grey where nothing is known.
 
@@ -390,24 +358,21 @@ def plot_lyapunov_map(
     for channel, values in enumerate(np.array([rgb(colour) for colour in _GROWTH]).T):
         cells[chaotic, channel] = np.interp(exponent[chaotic], levels, values)
     cells[~np.isfinite(exponent)] = rgb(_UNKNOWN)
-    raster = Raster(cells, across, upwards, scale=(_GROWTH, 0.0, top, _EXPONENT), layer=0.0)
-    frame, entries = Frame([raster], title=style.checked_text(title)), {}
+    frame = Frame([Raster(cells, across, upwards, scale=(_GROWTH, 0.0, top, _EXPONENT), layer=0.0)])
     known = list(dict.fromkeys(name for name, _, _ in lines))
     for name, x, y in lines:
-        pen = Pen(_LINES[known.index(name) % len(_LINES)])
-        frame.items.append(Polyline(np.array([x, y]), pen))
-        entries[name] = Entry(pen)
+        frame.add(Polyline(np.array([x, y]), Pen(_LINES[known.index(name) % len(_LINES)])), name)
     axes = Axis(r"$\omega$", *across[[0, -1]]), Axis(plain(chart.attrs["varied"]), *upwards[[0, -1]])
-    return figure_of(Drawing(axes, [frame], entries, grid=False), style.sheet_of(size), path)
+    return single(frame, axes, page, path, (6.4, 4.2), grid=False)
 
 
+@with_options(PageOptions)
 def plot_basins(
     basins: xarray.Dataset,
     path: str | Path | None = None,
     *,
     points: Sequence[np.ndarray] | None = None,
-    title: str | None = None,
-    size: Size = (5.6, 4.6),
+    **page: Unpack[PageOptions],
 ) -> Figure:
     """The plane of states, each in the colour of the motion that it tends to.
 
@@ -417,33 +382,33 @@ def plot_basins(
     names = [str(name) for name in basins["attractor"].to_numpy()]
     check_count("points", points, len(names), "attractors")
     labels = basins["label"].to_numpy()
-    cells, entries = np.zeros((*labels.shape, 3)), {}
+    cells, frame = np.zeros((*labels.shape, 3)), Frame()
     shares = dict(zip([str(k) for k in basins["kind"].to_numpy()], basins["share"].to_numpy(), strict=True))
     amplitude = basins["amplitude"].to_numpy()
     for i, (name, colour) in enumerate(zip(names, _colours(basins["period"].to_numpy()), strict=True)):
         cells[labels == i] = rgb(colour)
         if name in shares:
             words = rf"{name}, $\max\,|x|$ = {amplitude[i]:.4g}: {100.0 * shares[name]:.1f} %"
-            entries[words] = Entry(mark=Mark("s", 7.0, colour, style.SOFT, 0.5))
+            frame.entries[words] = Entry(mark=Mark("s", 7.0, colour, style.SOFT, 0.5))
     for number, (name, colour) in _OTHER.items():
         if (labels == number).any():
             cells[labels == number] = rgb(colour)
             words = f"{name}: {100.0 * shares[name]:.1f} %" if name in shares else name
             hatched = Entry(patch=colour, edge=style.SOFT, hatched=True)
             plain_entry = Entry(mark=Mark("s", 7.0, colour, style.SOFT, 0.5))
-            entries[words] = hatched if number == _APERIODIC else plain_entry
+            frame.entries[words] = hatched if number == _APERIODIC else plain_entry
     x, y = _edges(basins["x"].to_numpy()), _edges(basins["y"].to_numpy())
-    frame = Frame([Raster(cells, x, y, labels == _APERIODIC, layer=0.0)], title=style.checked_text(title))
+    frame.add(Raster(cells, x, y, labels == _APERIODIC, layer=0.0))
     for places in points or ():
         inside = (places >= (x[0], y[0])).all(axis=1) & (places <= (x[-1], y[-1])).all(axis=1)
-        frame.items.append(Markers(places[inside].T, Mark("o", 4.5, "#ffffff"), cut=True, layer=4.0))
+        frame.add(Markers(places[inside].T, Mark("o", 4.5, "#ffffff"), cut=True, layer=4.0))
     one = int(basins.attrs["dofs"]) == 1
     axes = [
         Axis(_symbol(basins.attrs[f"plane_{letter}"], one), *edges[[0, -1]])
         for letter, edges in zip("xy", (x, y), strict=True)
     ]
     # there is no free place inside
-    return figure_of(Drawing(axes, [frame], entries, legend="below", grid=False), style.sheet_of(size), path)
+    return single(frame, axes, page, path, (5.6, 4.6), legend="below", grid=False)
 
 
 def _colours(periods: np.ndarray) -> list[str]:
@@ -480,30 +445,26 @@ _MARKS = {
 }
 
 
+@with_options(PageOptions)
 def plot_verified(
     curve: xarray.Dataset,
     places: np.ndarray,
     outcomes: Sequence[str],
     unconfirmed: np.ndarray,
     path: str | Path | None = None,
-    *,
-    title: str | None = None,
-    size: str | tuple[float, float] = (6.4, 4.2),
+    **page: Unpack[PageOptions],
 ) -> Figure:
     """The curve of a dataset with a mark at each of `places` (P, 2), by its outcome.
 
     `unconfirmed` (B, 2): bifurcations that shooting did not confirm; they get a ring.
     """
     axes = Coordinates((str(curve.attrs["free"]), None), View())
-    frame, entries = response_frame([curve], axes)
-    frame.title = style.checked_text(title)
+    frame = response_frame([curve], axes)
     every = np.concatenate([np.reshape(places, (-1, 2)), np.reshape(unconfirmed, (-1, 2))])
     kinds = np.array([*outcomes, *["not confirmed"] * len(unconfirmed)])
     for outcome, (name, mark, layer) in _MARKS.items():
         here = every[kinds == outcome]
         if len(here):
-            frame.items.append(Markers(here.T, mark, role=outcome, layer=layer))
-            entries[name] = Entry(mark=mark)
+            frame.add(Markers(here.T, mark, role=outcome, layer=layer), name)
     across, upwards = axes.labels([curve])
-    drawing = Drawing((Axis(across), Axis(upwards, 0.0)), [frame], ordered(entries))
-    return figure_of(drawing, style.sheet_of(size), path)
+    return single(frame, (Axis(across), Axis(upwards, 0.0)), page, path, (6.4, 4.2), by_kind=True)

@@ -8,13 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
+from suboctave.options import with_options
 from suboctave.pictures import style
-from suboctave.pictures.drawing import Axis, Drawing, Entry, Frame, Polyline, Region
-from suboctave.pictures.paper import figure_of
+from suboctave.pictures.drawing import Axis, Frame, Polyline, Region
+from suboctave.pictures.options import PageOptions
+from suboctave.pictures.paper import single
 from suboctave.pictures.style import Pen, period_colour, period_name, tinted
 from suboctave.store.layout import coordinate
 
@@ -154,18 +156,18 @@ _Outline = tuple[np.ndarray, np.ndarray, np.ndarray]
 _Piece = tuple[str, np.ndarray, np.ndarray]
 
 
+@with_options(PageOptions)
 def plot_isola_map(
     regions: Sequence[tuple[str, _Outline, Sequence[Sequence[_Piece]]]],
     names: tuple[str, str],
     path: str | Path | None = None,
     *,
     bounds: tuple[float, float],
-    title: str | None = None,
-    size: str | tuple[float, float] = (6.4, 4.2),
     xlim: Sequence[float] | None = None,
     ylim: Sequence[float] | None = None,
     xlabel: str | None = None,
     ylabel: str | None = None,
+    **page: Unpack[PageOptions],
 ) -> Figure:
     """Shaded regions over two design parameters, `names` to the right and upwards.
 
@@ -177,22 +179,18 @@ def plot_isola_map(
     bounds
         What is shown of the parameter to the right, unless `xlim` says otherwise.
     """
-    frame, entries, shown = Frame(title=style.checked_text(title)), {}, []
+    frame = Frame()
     for period, (values, low, high), borders in regions:
         colour = tinted(period_colour(1 if period == "T" else int(period[:-1])), _PALE_MAP)
         outline = np.array([[*values, *values[::-1]], [*low, *high[::-1]]])
-        frame.items.append(Region(outline, colour, role="isola", layer=1.0))
-        shown.append(outline)
-        entries[f"{period} isola"] = Entry(patch=colour)
+        frame.add(Region(outline, colour, role="isola", layer=1.0), f"{period} isola")
         for words, x, y in (piece for pieces in borders for piece in pieces):
-            frame.items.append(Polyline(np.array([x, y]), _BORDERS[words], role=words))
-            entries[words] = Entry(_BORDERS[words])
+            frame.add(Polyline(np.array([x, y]), _BORDERS[words], role=words), words)
     upwards: Any = ylim
-    if ylim is None and shown:
-        every = np.concatenate([*shown, *(i.at for i in frame.items if isinstance(i, Polyline))], axis=1)[1]
-        margin = 0.12 * float(np.nanmax(every) - np.nanmin(every))
-        upwards = float(np.nanmin(every)) - margin, float(np.nanmax(every)) + margin
+    if ylim is None and frame.items:
+        every = [i.outline if isinstance(i, Region) else i.at for i in frame.items if isinstance(i, Region | Polyline)]
+        bottom, top = (float(end(np.concatenate(every, axis=1)[1])) for end in (np.nanmin, np.nanmax))
+        upwards = bottom - 0.12 * (top - bottom), top + 0.12 * (top - bottom)
     across = bounds if xlim is None else xlim
-    bottom, top = upwards or (None, None)
-    axes = Axis(xlabel or names[0], across[0], across[1]), Axis(ylabel or names[1], bottom, top)
-    return figure_of(Drawing(axes, [frame], entries), style.sheet_of(size), path)
+    axes = Axis(xlabel or names[0], across[0], across[1]), Axis(ylabel or names[1], *(upwards or (None, None)))
+    return single(frame, axes, page, path, (6.4, 4.2))

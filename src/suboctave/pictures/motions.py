@@ -234,9 +234,8 @@ class MotionDrawing:
         # beside several frames: inside one of them it would seem to be about that one
         legend = "free" if len(self.frames) == 1 else "outside"
         arranged: dict[str, Any] = {"columns": self.columns, "legend": legend, "grid": False, "small": True}
-        entries = {**self.legend, **self.last}
-        drawing = Drawing(axes, self.frames, entries, plain(self.title), **arranged)
-        return figure_of(drawing, self.sheet, self.path)
+        self.frames[0].entries = self.legend | self.last
+        return figure_of(Drawing(axes, self.frames, plain(self.title), **arranged), self.sheet, self.path)
 
 
 def _captions(datasets: Sequence[xarray.Dataset], view: MotionView) -> list[list[str]]:

@@ -48,6 +48,17 @@ DERIVATIVES = {"displacement": 0, "velocity": 1, "acceleration": 2}
 _DOTS = ("x", r"\dot{x}", r"\ddot{x}")
 
 
+class PageOptions(TypedDict, total=False):
+    """Keywords of every figure: its title and its size."""
+
+    title: Annotated[str | None, "Title."]
+    size: Annotated[
+        str | tuple[float, float] | None,
+        '"single-column" (84 mm), "double-column" (174 mm), or width and height in inches. The named sizes are widths '
+        "where there are several frames, or a legend above.",
+    ]
+
+
 class UnitOptions(TypedDict, total=False):
     """Keywords of every figure of curves or motions: units and texts of the axes, see `Units`."""
 
@@ -96,7 +107,7 @@ class CurveOptions(SpaceOptions, total=False):
     ]
 
 
-class MotionOptions(UnitOptions, total=False):
+class MotionOptions(UnitOptions, PageOptions, total=False):
     """Keywords of every figure of motions: which motions, how they are arranged, units and texts of the axes."""
 
     points: Annotated[Sequence[int] | None, "Which points of the branches, by index."]
@@ -106,12 +117,6 @@ class MotionOptions(UnitOptions, total=False):
     ]
     overlay: Annotated[bool | None, "All in one frame; else each in its own, on shared axes."]
     labels: Annotated[Sequence[str] | None, "Names of the motions."]
-    title: Annotated[str | None, "Title."]
-    size: Annotated[
-        str | tuple[float, float] | None,
-        '"single-column" (84 mm), "double-column" (174 mm), or width and height in inches. With several frames the '
-        "named sizes are widths.",
-    ]
 
 
 class SpectrumOptions(MotionOptions, total=False):

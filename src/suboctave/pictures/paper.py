@@ -27,6 +27,7 @@ from suboctave.pictures.drawing import (
     Frame,
     Guide,
     Item,
+    Label,
     Markers,
     Polyline,
     Raster,
@@ -34,6 +35,7 @@ from suboctave.pictures.drawing import (
     Surface,
     extent,
 )
+from suboctave.pictures.options import PageOptions
 from suboctave.pictures.strokes import bent
 
 if TYPE_CHECKING:
@@ -74,8 +76,15 @@ def figure_of(drawing: Drawing, sheet: style.Sheet, path: str | Path | None = No
     if path is not None:
         save_figure(figure, path)
     # Notebooks show an object that has this; without pyplot nothing else would tell them to.
-    setattr(figure, "_repr_png_", partial(_png_bytes, figure))  # noqa: B010
+    setattr(figure, "_repr_png_", partial(image_of, figure, "png", dpi=110.0))  # noqa: B010
     return figure
+
+
+def single(frame: Frame, axes: Sequence[Axis], page: PageOptions, path: Any, size: Any, **arranged: Any) -> Figure:
+    """The figure of one frame under its title, of `size` unless the page has another; `arranged`: as of `Drawing`."""
+    frame.title = style.checked_text(page.get("title"))
+    given = page.get("size")
+    return figure_of(Drawing(axes, [frame], **arranged), style.sheet_of(size if given is None else given), path)
 
 
 def _in_plane(figure: Figure, drawing: Drawing, sheet: style.Sheet) -> None:
@@ -99,22 +108,26 @@ def _in_plane(figure: Figure, drawing: Drawing, sheet: style.Sheet) -> None:
     _place(figure, frames, drawing, sheet)  # the frames have their places: what is spaced on paper comes now
     for axes, frame in zip(frames, drawing.frames, strict=True):
         _add_spaced(axes, frame, look)
-        known = [label for label in frame.labels if np.isfinite(label.at).all()]
-        annotate(figure, axes, np.array([label.at for label in known]), [label.text for label in known], look)
+        annotate(axes, frame.labels, look)
 
 
 def _place(figure: Figure, frames: Sequence[Axes], drawing: Drawing, sheet: style.Sheet) -> None:
     from matplotlib.legend_handler import HandlerTuple
 
     entries, where = handles(drawing.entries, sheet.look), drawing.legend
-    if where in ("free", "grow", "outside"):
-        place_legend(figure, [] if where == "outside" else frames, entries, sheet.look, grow=where == "grow")
+    arrange(figure)  # a legend inside one of the frames moves nothing
+    if where == "free" and any(_legend_inside(axes, entries, sheet) for axes in frames):
         return
-    beside = where == "beside" and sheet.inches[0] >= _WIDE
-    plain: dict[str, Any] = {"frameon": False, "handlelength": 2.2, "handleheight": 1.1}
-    place = "outside right upper" if beside else "outside lower center"
-    handlers = {tuple: HandlerTuple(ndivide=1)}
-    fitting_legend(figure, entries, sheet.look, most=1 if beside else 2, loc=place, handler_map=handlers, **plain)
+    if where in ("beside", "below"):
+        beside = where == "beside" and sheet.inches[0] >= _WIDE
+        plain: dict[str, Any] = {"frameon": False, "handlelength": 2.2, "handleheight": 1.1}
+        place = "outside right upper" if beside else "outside lower center"
+        handlers = {tuple: HandlerTuple(ndivide=1)}
+        fitting_legend(figure, entries, sheet, most=1 if beside else 2, loc=place, handler_map=handlers, **plain)
+    elif entries:
+        if sheet.named:
+            _grow(figure, entries, sheet)
+        fitting_legend(figure, entries, sheet, loc="outside upper center")
 
 
 # ---------------------------------------------------------------------------------------------------- what is in frames
@@ -304,15 +317,12 @@ def _fill_page(figure: Figure, axes: Any, drawing: Drawing, sheet: style.Sheet) 
     """Title and legend above, and the frame as large as what is left; a named size grows by the legend's height."""
     entries, look = handles(drawing.entries, sheet.look), sheet.look
     if sheet.named:
-        rows = fitting_legend(figure, entries, look, tight=True)
-        width, height = figure.get_size_inches()
-        figure.set_size_inches(width, height + rows.get_window_extent().height / figure.dpi)
-        rows.remove()
+        _grow(figure, entries, sheet)
     top, whole = 1.0, figure.bbox.height
     if drawing.title:
         figure.suptitle(drawing.title, fontsize=look.large, color=style.INK, y=0.985)
         top -= 2.0 * look.large / 72.0 * figure.dpi / whole
-    legend = fitting_legend(figure, entries, look, tight=True, loc="upper center", bbox_to_anchor=(0.5, top))
+    legend = fitting_legend(figure, entries, sheet, loc="upper center", bbox_to_anchor=(0.5, top))
     top = legend.get_window_extent().y0 / whole
     zoom, corner = 1.0, np.zeros(2)
     room = np.array([figure.bbox.width, top * whole])
@@ -369,26 +379,21 @@ def save_figure(figure: Figure, path: str | Path, *, dpi: float = 300.0) -> Path
     return target
 
 
-def svg_text(figure: Figure) -> str:
-    """The figure as SVG in memory."""
+def image_of(figure: Figure, form: str, **options: Any) -> bytes:
+    """The figure as "svg" or "png" in memory."""
     import matplotlib
 
-    buffer = io.StringIO()
-    with matplotlib.rc_context(_EMBEDDED):
-        figure.savefig(buffer, format="svg", metadata=_METADATA[".svg"])
-    return buffer.getvalue()
-
-
-def _png_bytes(figure: Figure, dpi: float = 110.0) -> bytes:
-    """The figure as PNG in memory."""
     buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=dpi)
+    with matplotlib.rc_context(_EMBEDDED):
+        figure.savefig(buffer, format=form, metadata=_METADATA[f".{form}"], **options)
     return buffer.getvalue()
 
 
 # --------------------------------------------------------------------------------------------------- legends and labels
 #: where a legend is tried inside a frame
 _PLACES: tuple[Any, ...] = ("upper left", "upper right", "center left", "center right", "lower left", "lower right")
+#: share of a frame's height from which a legend stands above it
+_TALL = 0.7
 #: so that two columns fit into the width of a journal's column
 _TIGHT: dict[str, Any] = {"handlelength": 2.0, "handletextpad": 0.5, "columnspacing": 1.0}
 #: distances of a text from its point, nearest first; further away where everything near is taken
@@ -396,35 +401,6 @@ _DISTANCES = (1.0, 2.4, 3.8)
 #: points kept clear between two texts, and, rather, between a text and the frame with its ticks
 _CLEAR, _TICKS = 1.5, 4.0
 _SIDES = ((1, 0), (-1, 0), (1, 1), (-1, 1), (1, -1), (-1, -1), (0, 1), (0, -1))
-
-
-def place_legend(
-    figure: Figure, frames: Sequence[Axes], entries: Mapping[str, Any], look: style.Look, *, grow: bool = False
-) -> None:
-    """Put the legend, names with their handles, into the first of `frames` that has room for it, else above them all.
-
-    Where it stands above, `grow` adds its height to the figure's. Everything on the figure has its place then.
-    """
-    arrange(figure)  # a legend inside one of the frames moves nothing
-    if not entries:
-        return
-    drawing = _frame_of(look, tight=grow)
-    for axes in frames:
-        pixels = _pixels(axes)
-        legend = axes.legend(list(entries.values()), list(entries), **drawing)
-        legend.set_zorder(6)
-        for place in _PLACES:
-            legend.set_loc(place)
-            if _is_free(figure, axes, legend, pixels):
-                return
-        legend.remove()
-    width, height = figure.get_size_inches()
-    if grow:  # as high as it may become, so that the frames keep theirs while it is measured
-        figure.set_size_inches(width, height + 2.0 * look.small / 72.0 * (len(entries) + 2))
-    legend = fitting_legend(figure, entries, look, tight=grow, loc="outside upper center")
-    if grow:
-        figure.set_size_inches(width, height + legend.get_window_extent().height / figure.dpi)
-        arrange(figure)
 
 
 def arrange(figure: Figure) -> None:
@@ -437,12 +413,11 @@ def arrange(figure: Figure) -> None:
 
 
 def fitting_legend(
-    figure: Figure, entries: Mapping[str, Any], look: style.Look, *, most: int = 4, tight: bool = False, **where: Any
+    figure: Figure, entries: Mapping[str, Any], sheet: style.Sheet, *, most: int = 4, **where: Any
 ) -> Legend:
     """The legend of a figure in as many columns as the page is wide, `most` at most; `where` as Matplotlib takes it."""
     for columns in range(max(1, min(len(entries), most)), 0, -1):
-        options = _frame_of(look, tight) | where
-        legend = figure.legend(list(entries.values()), list(entries), ncols=columns, **options)
+        legend = figure.legend(list(entries.values()), list(entries), ncols=columns, **_frame_of(sheet) | where)
         arrange(figure)
         if columns == 1 or legend.get_window_extent().width <= figure.bbox.width:
             break
@@ -450,99 +425,79 @@ def fitting_legend(
     return legend
 
 
-def _frame_of(look: style.Look, tight: bool) -> dict[str, Any]:
-    frame = {"fontsize": look.small, "frameon": True, "framealpha": 1.0, "edgecolor": style.GRID, "handlelength": 2.6}
-    return frame | (_TIGHT if tight else {})
+def _grow(figure: Figure, entries: Mapping[str, Any], sheet: style.Sheet) -> None:
+    """Add the height of the legend to that of the figure: a named size is a width."""
+    width, height = figure.get_size_inches()
+    legend = fitting_legend(figure, entries, sheet)
+    figure.set_size_inches(width, height + legend.get_window_extent().height / figure.dpi)
+    legend.remove()
 
 
-def _is_free(figure: Figure, axes: Axes, legend: Legend, pixels: np.ndarray) -> bool:
-    """Whether a legend is inside the frame, leaves room for something else, and covers nothing."""
-    box = legend.get_window_extent().padded(figure.dpi / 72.0 * style.MARKER_SIZE)
-    frame = axes.get_window_extent()
-    if box.x0 < frame.x0 - 1 or box.x1 > frame.x1 + 1 + 2 * style.MARKER_SIZE or box.height > 0.7 * frame.height:
-        return False
-    return not box.count_contains(pixels)
+def _legend_inside(axes: Axes, entries: Mapping[str, Any], sheet: style.Sheet) -> bool:
+    """Whether there is a place for the legend inside a frame where it covers nothing; it stands there then."""
+    if not entries:
+        return True
+    legend, frame = axes.legend(list(entries.values()), list(entries), **_frame_of(sheet)), axes.get_window_extent()
+    legend.set_zorder(6)
+    for place in _PLACES:
+        legend.set_loc(place)
+        box = legend.get_window_extent()
+        inside = frame.x0 <= box.x0 and box.x1 <= frame.x1 and box.height < _TALL * frame.height
+        if inside and not _covered(axes, box.padded(axes.figure.dpi / 72.0 * style.MARKER_SIZE)):
+            return True
+    legend.remove()
+    return False
 
 
-def annotate(figure: Figure, axes: Axes, places: np.ndarray, texts: Sequence[str], look: style.Look) -> None:
-    """Write `texts` beside `places`, (texts, 2) in data coordinates; the same text at the same place once.
+def _frame_of(sheet: style.Sheet) -> dict[str, Any]:
+    frame = {"frameon": True, "framealpha": 1.0, "edgecolor": style.GRID, "handlelength": 2.6}
+    return {"fontsize": sheet.look.small, **frame, **(_TIGHT if sheet.named else {})}
 
-    Of the sides of a point the one is taken on which the text covers the fewest lines, markers and other texts.
+
+def annotate(axes: Axes, labels: Sequence[Label], look: style.Look) -> None:
+    """Write texts beside their places; the same text at the same place once.
+
+    Of the sides of a place the one is taken on which the text covers the fewest lines, markers and other texts.
     """
-    if not len(texts):
-        return
-    points = axes.transData.transform(np.asarray(places, dtype=float))
-    pixels = _pixels(axes)
-    unit, window = figure.dpi / 72.0, axes.get_window_extent()
-    within = window.padded(-_TICKS * unit)
-    legend = axes.get_legend()
-    boxes = [] if legend is None else [legend.get_window_extent()]
-    gap, clear = 0.75 * style.MARKER_SIZE * look.marker, _CLEAR * unit
+    unit, window, legend = axes.figure.dpi / 72.0, axes.get_window_extent(), axes.get_legend()
+    taken = [] if legend is None else [legend.get_window_extent()]
+    gap = 0.75 * style.MARKER_SIZE * look.marker
+    looks: dict[str, Any] = {"fontsize": look.small, "color": style.INK, "zorder": 7, "gid": "label"}
     done: list[tuple[str, np.ndarray]] = []
-    for text, point in zip(texts, points, strict=True):
-        if any(text == other and np.hypot(*(point - there)) < 3.0 * unit for other, there in done):
+    for label in labels:
+        point = axes.transData.transform(label.at)
+        again = any(label.text == text and np.hypot(*(point - there)) < 3.0 * unit for text, there in done)
+        if again or not np.isfinite(point).all():
             continue
-        done.append((text, point))
-        probe = axes.text(0.0, 0.0, text, fontsize=look.small)
-        size = probe.get_window_extent()
-        probe.remove()
-        best: tuple[float, tuple[int, int], float] | None = None
-        for distance, (rank, side) in product(_DISTANCES, enumerate(_SIDES)):
-            reach = distance * gap
-            box = _beside(point, side, size.width, size.height, reach * unit)
-            cost = 2.0 * box.count_contains(pixels) + 400.0 * box.padded(clear).count_overlaps(boxes)
-            cost += 400.0 * _leaves(box, window) + 25.0 * _leaves(box, within) + 0.1 * rank + 5.0 * (distance - 1.0)
-            if best is None or cost < best[0]:
-                best = (cost, side, reach)
-        assert best is not None
-        _, side, reach = best
-        boxes.append(_beside(point, side, size.width, size.height, reach * unit))
-        axes.annotate(
-            text,
-            tuple(axes.transData.inverted().transform(point)),
-            xytext=_offset(side, reach),
-            textcoords="offset points",
-            ha=("center", "left", "right")[side[0]],
-            va=("center", "bottom", "top")[side[1]],
-            fontsize=look.small,
-            color=style.INK,
-            zorder=7,
-            annotation_clip=False,
-            gid="label",
-        )
+        done.append((label.text, point))
+        at: dict[str, Any] = {"xy": label.at, "textcoords": "offset points", "annotation_clip": False}
+        costs = {}
+        for distance, (rank, (across, up)) in product(_DISTANCES, enumerate(_SIDES)):
+            reach = distance * gap * (0.75 if across and up else 1.0)
+            sides: dict[str, Any] = {"ha": ("center", "left", "right")[across], "va": ("center", "bottom", "top")[up]}
+            note = axes.annotate(label.text, xytext=(reach * across, reach * up), **at, **sides, **looks)
+            box = note.get_window_extent()
+            overlaps = box.padded(_CLEAR * unit).count_overlaps(taken)
+            cost = 40.0 * _covered(axes, box) + 400.0 * (overlaps + _leaves(box, window))
+            costs[note] = cost + 25.0 * _leaves(box, window.padded(-_TICKS * unit)) + 0.1 * rank + 5.0 * distance
+        best = min(costs, key=lambda note: costs[note])
+        for note in costs:
+            if note is not best:
+                note.remove()
+        taken.append(best.get_window_extent())
 
 
-def _offset(side: tuple[int, int], gap: float) -> tuple[float, float]:
-    share = 0.75 if side[0] and side[1] else 1.0
-    return side[0] * gap * share, side[1] * gap * share
-
-
-def _beside(point: np.ndarray, side: tuple[int, int], width: float, height: float, gap: float) -> Bbox:
-    """The box of a text on one side of a point."""
-    from matplotlib.transforms import Bbox
-
-    across, up = _offset(side, gap)
-    x = point[0] + across - (0.5, 0.0, 1.0)[side[0]] * width
-    y = point[1] + up - (0.5, 0.0, 1.0)[side[1]] * height
-    return Bbox.from_bounds(x, y, width, height)
-
-
-def _pixels(axes: Axes) -> np.ndarray:
-    """Pixels (points, 2) along all lines and markers: a long piece may cross a box that holds none of its ends."""
-    pixels = [np.empty((0, 2))]
+def _covered(axes: Axes, box: Bbox) -> int:
+    """How many lines cross a box, in pixels, and markers lie in it."""
+    count = 0
     for item in axes.get_lines():
-        data = np.column_stack([item.get_xdata(), item.get_ydata()]).astype(float)
-        path = item.get_transform().transform(data[np.isfinite(data).all(axis=1)])
-        if len(path) == 0:
-            continue
-        if item.get_linestyle() == "None":
+        path = item.get_transform().transform_path(item.get_path())
+        if item.get_linestyle() != "None":
+            count += path.intersects_bbox(box, filled=False)
+        else:
             reach = 0.35 * item.get_markersize() * axes.figure.dpi / 72.0
-            pixels += [path + reach * np.array(side) for side in ((0, 0), *_SIDES)]
-            continue
-        along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
-        dense = np.linspace(0.0, along[-1], int(along[-1]) + 2)
-        pixels.append(np.column_stack([np.interp(dense, along, column) for column in path.T]))
-    return np.concatenate(pixels)
+            count += box.padded(reach).count_contains(path.vertices)
+    return count
 
 
 def _leaves(box: Bbox, frame: Bbox) -> bool:

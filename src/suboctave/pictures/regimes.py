@@ -9,14 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
+from suboctave.options import with_options
 from suboctave.pictures import style
-from suboctave.pictures.drawing import Axis, Drawing, Entry, Frame, Polyline, Raster
+from suboctave.pictures.drawing import Axis, Entry, Frame, Polyline, Raster
 from suboctave.pictures.layers import check_count
-from suboctave.pictures.paper import DOT, figure_of
+from suboctave.pictures.options import PageOptions
+from suboctave.pictures.paper import DOT, single
 from suboctave.pictures.style import Pen, period_colour, rgb, tinted
 
 if TYPE_CHECKING:
@@ -35,6 +37,7 @@ _UNKNOWN = "#3d3d3d"
 _DASHES: dict[str, style.Dash] = {"PD": (0, (3.2, 1.4)), "NS": (0, (1.0, 1.0)), "BP": (0, (5.0, 1.4, 1.0, 1.4))}
 
 
+@with_options(PageOptions)
 def plot_regimes(
     cells: np.ndarray,
     regimes: Sequence[Regime],
@@ -43,13 +46,12 @@ def plot_regimes(
     names: tuple[str, str],
     path: str | Path | None = None,
     *,
-    title: str | None = None,
-    size: str | tuple[float, float] = (7.4, 4.6),
     curves: bool = True,
     labels: Sequence[str] | None = None,
     smallest: float = 5e-4,
     xlabel: str | None = None,
     ylabel: str | None = None,
+    **page: Unpack[PageOptions],
 ) -> Figure:
     """Colour a raster of regimes.
 
@@ -74,22 +76,20 @@ def plot_regimes(
     across, upwards = (np.linspace(*own, count + 1) for own, count in zip(ranges, cells.shape[::-1], strict=True))
     image = np.array([rgb(colour) for colour in colours]).reshape(-1, 3)[cells]
     dotted = isolated[cells] if len(regimes) else np.zeros(cells.shape, dtype=bool)
-    frame = Frame([Raster(image, across, upwards, dotted=dotted, layer=0.0)], title=style.checked_text(title))
-    entries: dict[str, Entry] = {}
+    frame = Frame([Raster(image, across, upwards, dotted=dotted, layer=0.0)])
     for number in sorted(range(len(regimes)), key=lambda i: _rank(regimes[i])):
         if np.count_nonzero(cells == number) > smallest * cells.size:
             mark = DOT if isolated[number] else None
             words = regimes[number][0] if labels is None else labels[number]
-            entries[words] = Entry(mark=mark, patch=colours[number], edge=style.SOFT)
-    shown = len({int(number) for number in np.unique(cells)})
-    if len(entries) < shown:
-        entries[f"({shown - len(entries)} smaller ones)"] = Entry()
+            frame.entries[words] = Entry(mark=mark, patch=colours[number], edge=style.SOFT)
+    unnamed = len(np.unique(cells)) - len(frame.entries)
+    if unnamed > 0:
+        frame.entries[f"({unnamed} smaller ones)"] = Entry()
     for kind, x, y in lines if curves else ():
         pen = Pen(style.INK, 0.65, _DASHES.get(kind, style.STABLE_DASH))
-        frame.items.append(Polyline(np.array([x, y]), pen, role=kind))
-        entries.setdefault(style.kind_style(kind).name, Entry(pen))
+        frame.add(Polyline(np.array([x, y]), pen, role=kind), style.kind_style(kind).name)
     axes = Axis(xlabel or names[0], *ranges[0]), Axis(ylabel or names[1], *ranges[1])
-    return figure_of(Drawing(axes, [frame], entries, legend="beside", grid=False), style.sheet_of(size), path)
+    return single(frame, axes, page, path, (7.4, 4.6), legend="beside", grid=False)
 
 
 # ------------------------------------------------------------------------------------------------------------- colours

@@ -27,7 +27,7 @@ from suboctave.pictures.browser import figure_data
 from suboctave.pictures.drawing import Drawing
 from suboctave.pictures.isolas import is_isolas, parameter_of
 from suboctave.pictures.layers import fixed_parameters, spelt
-from suboctave.pictures.paper import figure_of, svg_text
+from suboctave.pictures.paper import figure_of, image_of
 from suboctave.pictures.response import response_drawing
 from suboctave.pictures.space import space_drawing
 from suboctave.pictures.style import period_name, period_of
@@ -264,8 +264,8 @@ def _boundaries(curves: Mapping[str, xarray.Dataset]) -> Figure:
 def _figure(drawing: Drawing, name: str, words: str) -> Figure:
     """A drawing for the browser and as a still picture."""
     sheet = style.sheet_of(_SIZE if len(drawing.axes) == 2 else _SIZE_IN_SPACE)
-    still = svg_text(figure_of(drawing, sheet)).encode("utf-8")
-    return Figure(figure_data(drawing, name), base64.b64encode(still).decode("ascii"), words)
+    still = base64.b64encode(image_of(figure_of(drawing, sheet), "svg")).decode("ascii")
+    return Figure(figure_data(drawing, name), still, words)
 
 
 def _file_name(names: Sequence[str] | Mapping[str, Any]) -> str:

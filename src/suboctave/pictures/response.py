@@ -16,7 +16,7 @@ from suboctave.errors import InputError
 from suboctave.options import with_options
 from suboctave.pictures import style
 from suboctave.pictures.boundary import boundary_names, boundary_styles, is_boundary, plot_boundaries
-from suboctave.pictures.drawing import Axis, Drawing, Entry, Frame, Markers, Ticks, ordered, plain
+from suboctave.pictures.drawing import Axis, Drawing, Entry, Frame, Markers, Ticks, plain
 from suboctave.pictures.isolas import is_isolas
 from suboctave.pictures.layers import (
     Seen,
@@ -103,17 +103,15 @@ def response_drawing(
     every = [dataset for group in groups for dataset in group]
     axes = Coordinates((_common_axis(every, x), None), view or View())
     by_period = several_periods(every)
-    frames, entries = [], dict[str, Entry]()
-    for index, group in enumerate(groups):
-        frame, own = response_frame(group, axes, None if labels is None else labels[index], by_period, names)
-        frames.append(frame)
-        entries |= own
+    frames = [
+        response_frame(group, axes, None if labels is None else labels[index], by_period, names)
+        for index, group in enumerate(groups)
+    ]
     across, upwards = axes.labels(every)
     (x0, x1), (y0, y1) = axes.limits(every, *_MARGINS, from_zero=True)
     ticks = Ticks(8, (3, 4.5, 6, 9)) if axes.view.in_degrees and y1 - y0 > 67.0 else None  # degrees
-    return Drawing(
-        (Axis(across, x0, x1), Axis(upwards, y0, y1, ticks=ticks)), frames, ordered(entries), columns=len(groups)
-    )
+    both = Axis(across, x0, x1), Axis(upwards, y0, y1, ticks=ticks)
+    return Drawing(both, frames, columns=len(groups), by_kind=True)
 
 
 def draw_response(
@@ -132,11 +130,11 @@ def draw_response(
     """
     group = _as_list(curves)
     coordinates = Coordinates((_common_axis(group, x), None), view or View())
-    frame, entries = response_frame(group, coordinates, labels, by_period)
+    frame = response_frame(group, coordinates, labels, by_period)
     draw(axes, frame, look)
     across, upwards = coordinates.labels(group)
     dress(axes, (across, upwards), look)
-    return handles(entries, look)
+    return handles(frame.entries, look)
 
 
 def response_frame(
@@ -145,8 +143,8 @@ def response_frame(
     labels: Sequence[str] | None = None,
     by_period: bool | None = None,
     called: Sequence[str] | None = None,
-) -> tuple[Frame, dict[str, Entry]]:
-    """The curves of one frame laid out, and their entries in the legend, only of what occurs.
+) -> Frame:
+    """The curves of one frame laid out, in the legend only of what occurs.
 
     `called`: what they are called in the browser, if not by their labels.
     """
@@ -163,16 +161,16 @@ def response_frame(
     order = sorted(range(len(group)), key=lambda index: period_of(group[index])) if periods else range(len(group))
     spread = _spread(np.concatenate([axes.of(dataset)[0] for dataset in group], axis=1))
     earlier: dict[Pen, list[np.ndarray]] = {}
-    frame, entries, marks = Frame(), dict[str, Entry](), dict[str, Entry]()
+    frame = Frame()
     for index in order:
         dataset, pen = group[index], pens[index]
         if labels is not None or several or periods:
-            entries[names[index]] = Entry(Pen(pen.colour, 1.3 * pen.width))
+            frame.entries[names[index]] = Entry(Pen(pen.colour, 1.3 * pen.width))
         seen = _seen(titles[index] if several else "")
         for stable in add_strokes(frame, dataset, axes, pen, seen, earlier=earlier, spread=spread) - {None}:
             # where ink is the colour of one period, the dashes are shown in a colour of none
             plain_pen = Pen(style.SOFT if periods else style.INK, 1.0, style.UNSTABLE_DASH)
-            entries[_ROLES[stable]] = Entry(plain_pen.along(stable))
+            frame.entries[_ROLES[stable]] = Entry(plain_pen.along(stable))
     for index in order:  # markers after all lines: none is crossed out by another curve
         dataset, curve = group[index], titles[index] if several else ""
         # the shape tells the kind, the filling the criticality, the edge the curve, where there are several
@@ -182,9 +180,9 @@ def response_frame(
             layer = (4.0 if kind == "grazing" else 5.0) + (0.5 if smaller < 1.0 else 0.0)
             name = f"{curve}: {look.name}" if curve else look.name
             mark = look.mark(edge, smaller, 1.5 if curve else 1.0)
-            frame.items.append(Markers(mark=mark, layer=layer, name=name, group=curve or look.name, **placed))
-            marks[look.name] = Entry(mark=look.mark())
-    return frame, entries | marks
+            frame.add(Markers(mark=mark, layer=layer, name=name, group=curve or look.name, **placed))
+            frame.entries[look.name] = Entry(mark=look.mark())
+    return frame
 
 
 _ROLES = {None: "curve", True: "stable", False: "unstable"}

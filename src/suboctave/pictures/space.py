@@ -124,22 +124,23 @@ def space_drawing(
     floor = limits[2][0]
     called = dict(zip(map(id, given), names or (), strict=False))
     frame = Frame([*shade(heads, axes.names[:2], axes.factors, floor)])
-    entries: dict[str, Entry] = {}
     for nu, grid in _surfaces(given, axes):
         words = f"{period_name(nu)} isola"
         seen: dict[str, Any] = {"role": "isola", "layer": 2.0, "name": words, "group": words}
-        frame.items.append(Surface(grid, period_colour(nu), _CLEAR, **seen))
-        entries[words] = Entry(patch=period_colour(nu), opacity=2.0 * _CLEAR)
+        frame.add(Surface(grid, period_colour(nu), _CLEAR, **seen))
+        frame.entries[words] = Entry(patch=period_colour(nu), opacity=2.0 * _CLEAR)
     bounds = [(dataset, with_ends(dataset, heads)) for dataset in group if is_boundary(dataset)]
     responses = [dataset for dataset in group if not is_boundary(dataset)]
     kinds = {(kind_of(dataset), period_of(dataset)) for dataset, _ in bounds}
-    own, dashes = _add_responses(frame, responses, axes, called, kinds)
-    entries |= own | _add_boundaries(frame, bounds, axes, called, floor) | dashes
+    dashed = _add_responses(frame, responses, axes, called, kinds)
+    _add_boundaries(frame, bounds, axes, called, floor)
+    if dashed:
+        frame.entries["unstable"] = Entry(Pen(style.SOFT, _THIN, style.UNSTABLE_DASH))
     marks = [item.role for item in frame.items if isinstance(item, Markers)]
     short = {event_words(kind): style.kind_style(kind).name for kind, _ in kinds}
-    entries |= {short.get(name, name): entry for name, entry in event_entries(marks).items()}
+    frame.entries |= {short.get(name, name): entry for name, entry in event_entries(marks).items()}
     labels = axes.labels(group)
-    return Drawing([Axis(label, *own) for label, own in zip(labels, limits, strict=True)], [frame], entries)
+    return Drawing([Axis(label, *own) for label, own in zip(labels, limits, strict=True)], [frame])
 
 
 def _add_responses(
@@ -148,12 +149,11 @@ def _add_responses(
     axes: Coordinates,
     called: dict[int, str],
     tracked: set[tuple[str, int]],
-) -> tuple[dict[str, Entry], dict[str, Entry]]:
+) -> bool:
     """Response curves from the back to the front, with markers where they meet curves of bifurcations.
 
-    Returns their entries in the legend, and that of their dashes.
+    Returns whether parts of them are unstable.
     """
-    entries: dict[str, Entry] = {}
     depths = [float(np.nanmean(axes.of(dataset)[0][1])) for dataset in responses]
     verdicts = set[bool | None]()
     for index in np.argsort(depths, kind="stable")[::-1]:
@@ -162,13 +162,12 @@ def _add_responses(
         verdicts |= add_strokes(frame, dataset, axes, pen, seen_as("response", name))
     for nu in sorted({period_of(dataset) for dataset in responses}):
         words = "response" if nu == 1 else f"response, {period_name(nu)}"
-        entries[words] = Entry(Pen(period_colour(nu), _THIN))
+        frame.entries[words] = Entry(Pen(period_colour(nu), _THIN))
     for dataset in responses:
         met = [(str(kind), period_of(dataset)) in tracked for kind in dataset["event_kind"].to_numpy()]
         for _, look, placed in events_of(dataset, axes, np.array(met, dtype=bool)):
-            mark = look.mark(size=1.3 * SMALL)
-            frame.items.append(Markers(mark=mark, layer=6.0, name=look.name, group=look.name, **placed))
-    return entries, {"unstable": Entry(Pen(style.SOFT, _THIN, style.UNSTABLE_DASH))} if False in verdicts else {}
+            frame.add(Markers(mark=look.mark(size=1.3 * SMALL), layer=6.0, name=look.name, group=look.name, **placed))
+    return False in verdicts
 
 
 def _add_boundaries(
@@ -177,9 +176,9 @@ def _add_boundaries(
     axes: Coordinates,
     called: dict[int, str],
     floor: float,
-) -> dict[str, Entry]:
+) -> None:
     """Curves of bifurcations, as given and with the ends of isolas among their events, and their projections."""
-    entries, within = dict[str, Entry](), set[bool | None]()
+    within = set[bool | None]()
     names = [plain(name) for name in boundary_names([dataset for dataset, _ in bounds])]
     pens = boundary_styles([dataset for dataset, _ in bounds], names)
     for (given, dataset), name, pen in zip(bounds, names, pens, strict=True):
@@ -187,9 +186,9 @@ def _add_boundaries(
         curve = called.get(id(given), name)
         add_strokes(frame, dataset, axes, pale, seen_as("floor", curve), floor=floor, layer=1.0)
         within |= add_strokes(frame, dataset, axes, thick, seen_as("boundary", curve), layer=5.0)
-        entries[name] = Entry(thick.along(None))
+        frame.entries[name] = Entry(thick.along(None))
         frame.items += event_markers(dataset, axes, np.ones(dataset.sizes["event"], dtype=bool))
-    return entries | verdict_entries(within, _THICK)
+    frame.entries |= verdict_entries(within, _THICK)
 
 
 def _surfaces(given: Sequence[xarray.Dataset], axes: Coordinates) -> list[tuple[int, np.ndarray]]:
