@@ -17,7 +17,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -38,11 +37,11 @@ from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.truncation import AdaptiveHarmonics
 from suboctave.interruption import Interruption
-from suboctave.model.system import System, build, describe
+from suboctave.model.system import System, describe
 from suboctave.results.branch import Branch, TrackedBranch, tracked_points, tracked_record
 from suboctave.results.diagram import BifurcationDiagram, DiagramBranch
 from suboctave.store.layout import branch_dataset, events_met
-from suboctave.store.plain import Prefixed, array_of, flat, from_json, padded, system_arrays, to_json
+from suboctave.store.plain import Prefixed, Recorded, from_json, padded, recorded
 from suboctave.store.registry import Codec, parts_of, register
 
 if TYPE_CHECKING:
@@ -53,14 +52,11 @@ _CLASSES = {
     c.__name__: c
     for c in (Audit, Unsettled, Ending, GrazingContact, Junction, AdaptiveHarmonics, FloquetResult, NormalForm)
 }
-_MEANINGS = {
-    "coefficients": "a_0, a_1, b_1, ... of x(t) = a_0 + sum a_k cos(k w t) + b_k sin(k w t), w = omega / period",
-    "event_coefficients": "the same of the motions at events",
-    "arclength": "distance along the branch in scaled arclength",
-    "iterations": "Newton iterations",
-    "multiplier_errors": "estimated errors of the multipliers",
-    "record": "system, options, warnings, audit and what motions share, as JSON",
-}
+#: attributes of a branch that its record holds as they are
+_OWN = ("name", "options", "warnings", "audit", "closed", "endings", "departs", "arrives", "observe")
+#: what an event's row in `fields` leaves to others
+_ELSEWHERE = ("orbit", "floquet", "null_vectors", "context")
+_RECORD = "system, options, warnings, audit and what motions share, as JSON"
 
 
 def branch_to_dataset(branch: Branch) -> xarray.Dataset:
@@ -68,55 +64,35 @@ def branch_to_dataset(branch: Branch) -> xarray.Dataset:
 
     Raises InputError where its system cannot be written down.
     """
-    import xarray
-
-    writer = _Writer()
-    dataset = branch_dataset(branch)
-    new: dict[str, Any] = {
-        "arclength": (("point",), branch.arclength),
-        "iterations": (("point",), np.array([p.iterations for p in branch.points], dtype=int)),
-    }
-    points = [p.orbit for p in branch.points]
-    new |= _orbits("", "point", points, [p.floquet for p in branch.points])
-    events = events_met(branch)
+    writer, events = _Writer(), events_met(branch)
     lists = enumerate((branch.bifurcations.met, branch.events.met))
     listed = {id(event): (which, i) for which, items in lists for i, event in enumerate(items)}
-    new |= _orbits("event_", "event", [e.orbit for e in events], [e.floquet for e in events])
-    for side in ("right", "left"):
-        rows = [() if e.null_vectors is None else getattr(e.null_vectors, side) for e in events]
-        new[f"event_null_{side}"] = (("event", "null"), padded(rows, complex))
-    record = {
+    record = {name: getattr(branch, name) for name in (*_OWN, "ended")} | {
         "points": [writer.motion(p.orbit, p.floquet) for p in branch.points],
         "event_list": [listed[id(event)] for event in events],
         "events": [writer.event(event, branch) for event in events],
-        "name": branch.name,
-        "options": branch.options,
-        "warnings": tuple(branch.warnings),
-        "audit": branch.audit,
-        "closed": bool(branch.closed),
-        "ended": branch.ended,
-        "endings": branch.endings,
-        "departs": branch.departs,
-        "arrives": branch.arrives,
-        "observe": int(branch.observe),
         "seconds": float(branch.seconds),
         "system": writer.system(branch.system),
         "tables": writer.tables,
         "tracked": tracked_record(branch) if isinstance(branch, TrackedBranch) else None,
     }
-    new["record"] = ((), np.array(to_json(record), dtype=object))
-    for name, array in writer.arrays.items():
-        new[name] = (tuple(f"{name}_{axis}" for axis in range(array.ndim)), array)
-    for name, meaning in _MEANINGS.items():
-        new[name] = (*new[name][:2], {"long_name": meaning})
-    # a parameter that bears the name of a variable is in `parameters` all the same
-    coords = [name for name in dataset.coords if name not in new]
-    variables = {name: (v.dims, v.values, v.attrs) for name, v in dataset.variables.items() if name not in new} | new
-    attributes = {name: value for name, value in dataset.attrs.items() if name != "warnings"}  # they are in `record`
-    if branch.seconds == branch.seconds:
-        attributes["seconds"] = float(branch.seconds)
-    attributes["contents"] = "branch"
-    return xarray.Dataset(dict(flat(variables)), attrs=attributes).set_coords(coords)
+    iterations = np.array([p.iterations for p in branch.points], dtype=int)
+    verdicts = [e.floquet for e in events]
+    variables: dict[str, Any] = {
+        "arclength": (("point",), branch.arclength, {"long_name": "distance along the branch in scaled arclength"}),
+        "iterations": (("point",), iterations, {"long_name": "Newton iterations"}),
+        "coefficients": _coefficients("", "point", branch.orbits),
+        "event_coefficients": _coefficients("event_", "event", [e.orbit for e in events]),
+        "event_multipliers": (("event", "event_floquet"), padded([v.multipliers for v in verdicts], complex)),
+        "event_multiplier_errors": (("event", "event_floquet"), padded([v.errors for v in verdicts], float)),
+    }
+    for side in ("right", "left"):
+        rows = [() if e.null_vectors is None else getattr(e.null_vectors, side) for e in events]
+        variables[f"event_null_{side}"] = (("event", "null"), padded(rows, complex))
+    dataset = recorded(branch_dataset(branch), record, _RECORD, writer.arrays, variables)
+    del dataset.attrs["warnings"]  # they are in `record`
+    seconds = {"seconds": float(branch.seconds)} if branch.seconds == branch.seconds else {}
+    return dataset.assign_attrs(**seconds, contents="branch")
 
 
 def branch_from_dataset(dataset: xarray.Dataset, allow_code: bool = False, linear: LinearPart | None = None) -> Branch:
@@ -137,22 +113,16 @@ register(
 )
 
 
-def _orbits(
-    prefix: str, dimension: str, orbits: Sequence[PeriodicOrbit], verdicts: Sequence[FloquetResult]
-) -> dict[str, tuple[tuple[str, ...], Any]]:
-    """Coefficients and multipliers of several motions, padded to the longest."""
-    longest = max((o.coefficients.shape[0] for o in orbits), default=0)
-    size = max((o.coefficients.shape[1] for o in orbits), default=0)
-    table = np.zeros((len(orbits), longest, size))
+def _coefficients(prefix: str, dimension: str, orbits: Sequence[PeriodicOrbit]) -> tuple[Any, ...]:
+    """The Fourier coefficients of several motions, padded to the longest."""
+    sizes = np.max([o.coefficients.shape for o in orbits], axis=0) if orbits else (0, 0)
+    table = np.zeros((len(orbits), *sizes))
     for row, orbit in zip(table, orbits, strict=True):
         row[: orbit.coefficients.shape[0], : orbit.coefficients.shape[1]] = orbit.coefficients
+    meaning = "a_0, a_1, b_1, ... of x(t) = a_0 + sum a_k cos(k w t) + b_k sin(k w t), w = omega / period"
     # a dimension of its own for each: the longest motion among the points is not that among the events
     shape = (dimension, f"{prefix}coefficient", "unknown" if orbits else f"{prefix}unknown")
-    variables: dict[str, tuple[tuple[str, ...], Any]] = {f"{prefix}coefficients": (shape, table)}
-    numbers = (dimension, "event_floquet" if prefix else "multiplier")
-    variables[f"{prefix}multipliers"] = (numbers, padded([v.multipliers for v in verdicts], complex))
-    variables[f"{prefix}multiplier_errors"] = (numbers, padded([v.errors for v in verdicts], float))
-    return variables
+    return shape, table, {"long_name": "the same of the motions at events" if prefix else meaning}
 
 
 class _Writer:
@@ -196,37 +166,29 @@ class _Writer:
         return [self._discretisation(orbit.balance), rule, len(floquet.multipliers), verdict]
 
     def event(self, event: Bifurcation, branch: Branch) -> dict[str, Any]:
-        taken = ("orbit", "floquet", "null_vectors", "context")
-        plain = {f.name: getattr(event, f.name) for f in fields(event) if f.name not in taken}
-        orbit = event.orbit
-        own = {
+        orbit, vectors, context = event.orbit, event.null_vectors, event.context
+        if context is not None:
+            context = {**context, "system": self.system(context.get("system", branch.system))}
+        return {
+            "fields": {f.name: getattr(event, f.name) for f in fields(event) if f.name not in _ELSEWHERE},
             "omega": orbit.omega,
             "values": dict(orbit.values),
             "residual": orbit.residual,
             "truncation": orbit.truncation,
             "orbit": self.motion(orbit, event.floquet),
-            "null": None,
+            "null": None
+            if vectors is None
+            else [len(vectors.right), bool(np.iscomplexobj(vectors.right)), len(vectors.left)],
             "normal_form": event.normal_form,
-            "context": None,
+            "context": None if context is None else self._listed("contexts", context),
         }
-        if event.null_vectors is not None:
-            vectors = event.null_vectors
-            own["null"] = [len(vectors.right), bool(np.iscomplexobj(vectors.right)), len(vectors.left)]
-        if event.context is not None:
-            context = {**event.context, "system": self.system(event.context.get("system", branch.system))}
-            own["context"] = self._listed("contexts", context)
-        return {"fields": plain, **own}
 
 
-class _Reader:
+class _Reader(Recorded):
     def __init__(self, dataset: xarray.Dataset, allow_code: bool, linear: LinearPart | None) -> None:
-        self.dataset = dataset
-        self.record = from_json(str(dataset["record"].item()), _CLASSES)
+        super().__init__(dataset, allow_code, _CLASSES)
         self.tables = self.record["tables"]
-        self._arrays: dict[str, np.ndarray] = {}
-        stored = system_arrays(dataset)
-        self.systems = [build(text, stored, allow_code) for text in self.tables["systems"]]
-        self.system = self.systems[self.record["system"]]
+        self.systems = [self.system(text) for text in self.tables["systems"]]
         self.balances = [self._balance(d, linear) for d in self.tables["discretisations"]]
 
     def _balance(self, stated: Mapping[str, Any], linear: LinearPart | None) -> HarmonicBalance:
@@ -240,33 +202,16 @@ class _Reader:
         basis = HarmonicBasis(stated["harmonics"], stated["nu"])
         return HarmonicBalance(system, basis, values, linear if other else None, stated["samples"])
 
-    def array(self, name: str) -> np.ndarray:
-        """A variable, each put together once."""
-        if name not in self._arrays:
-            self._arrays[name] = array_of(self.dataset, name)
-        return self._arrays[name]
-
-    def motion(
-        self,
-        prefix: str,
-        i: int,
-        stored: Sequence[Any],
-        omega: float,
-        values: dict[str, float],
-        residual: float,
-        error: float,
-    ) -> tuple[PeriodicOrbit, FloquetResult]:
-        """A motion with its verdict; `error`: what was neglected of it."""
+    def motion(self, prefix: str, i: int, stored: Sequence[Any], *numbers: Any) -> tuple[Any, FloquetResult]:
+        """A motion with its verdict; `numbers`: omega, values of the parameters, residual, what was neglected of it."""
         which, rule, count, verdict = stored
         balance = self.balances[which]
-        x = self.array(f"{prefix}coefficients")[i, : balance.basis.size, : balance.size].copy()
+        x = self[f"{prefix}coefficients"][i, : balance.basis.size, : balance.size].copy()
+        multipliers, errors = (self[f"{prefix}{n}"][i, :count].copy() for n in ("multipliers", "multiplier_errors"))
+        omega, values, residual, truncation = numbers
         adaptive = None if rule < 0 else self.tables["rules"][rule]
-        multipliers, errors = (
-            self.array(f"{prefix}{name}")[i, :count].copy() for name in ("multipliers", "multiplier_errors")
-        )
-        return PeriodicOrbit(balance, x, omega, values, residual, error, adaptive), FloquetResult(
-            multipliers, errors, **verdict
-        )
+        orbit = PeriodicOrbit(balance, x, omega, values, residual, truncation, adaptive)
+        return orbit, FloquetResult(multipliers, errors, **verdict)
 
     def branch(self) -> Branch:
         record = self.record
@@ -275,62 +220,51 @@ class _Reader:
         for (place, index), event in zip(record["event_list"], events, strict=True):
             lists[place][index] = event
         bifurcations, own = ([items[i] for i in range(len(items))] for items in lists)
+        given: dict[str, Any] = {name: record.get(name) for name in _OWN}
+        # older files hold the sentence alone
+        given["endings"] = given["endings"] or read_endings(record["ended"])
+        given |= {"system": self.systems[record["system"]], "points": points}
+        given |= {"bifurcations": bifurcations, "events": own}
         tracked = record.get("tracked")
-        make: Any = Branch
-        if tracked:
-            make = partial(TrackedBranch, tracked["kind"], tracked["names"], turning=tracked.get("turning", ""))
-        branch: Branch = make(
-            self.system,
-            record["name"],
-            points,
-            bifurcations,
-            own,
-            record["closed"],
-            # older files hold the sentence alone
-            record.get("endings") or read_endings(record["ended"]),
-            record["observe"],
-            record["options"],
-            record["warnings"],
-            record["audit"],
-            record.get("departs"),
-            record.get("arrives"),
+        branch = (
+            TrackedBranch(tracked["kind"], tracked["names"], turning=tracked.get("turning", ""), **given)
+            if tracked
+            else Branch(**given)
         )
         branch.seconds = record["seconds"]
         return branch
 
     def _points(self) -> list[BranchPoint]:
-        names = [str(name) for name in self.array("parameter")]
-        omega, values = self.array("omega"), self.array("parameters")
-        residual, error = self.array("residual"), self.array("error")
-        arclength, iterations = self.array("arclength"), self.array("iterations")
+        names = [str(name) for name in self["parameter"]]
+        values = [dict(zip(names, row, strict=True)) for row in self["parameters"].tolist()]
+        omega, residual, error, arclength, iterations = (
+            self[name].tolist() for name in ("omega", "residual", "error", "arclength", "iterations")
+        )
         points = []
         for i, stored in enumerate(self.record["points"]):
-            at = {name: float(value) for name, value in zip(names, values[i], strict=True)}
-            orbit, floquet = self.motion("", i, stored, float(omega[i]), at, float(residual[i]), float(error[i]))
-            points.append(BranchPoint(orbit, floquet, float(arclength[i]), int(iterations[i])))
-        if self.record.get("tracked"):
-            points[:] = tracked_points(points, self.record["tracked"])
-        return points
+            motion = self.motion("", i, stored, omega[i], values[i], residual[i], error[i])
+            points.append(BranchPoint(*motion, arclength[i], iterations[i]))
+        tracked = self.record.get("tracked")
+        return tracked_points(points, tracked) if tracked else points
 
     def _events(self) -> list[Bifurcation]:
-        right, left = self.array("event_null_right"), self.array("event_null_left")
+        right, left = self["event_null_right"], self["event_null_left"]
         events = []
         for i, stored in enumerate(self.record["events"]):
             numbers = stored["omega"], stored["values"], stored["residual"], stored["truncation"]
             orbit, floquet = self.motion("event_", i, stored["orbit"], *numbers)
-            vectors = None
+            vectors = context = None
             if stored["null"] is not None:
                 wide, is_complex, narrow = stored["null"]
                 pair = right[i, :wide], left[i, :narrow]
                 vectors = NullVectors(*(p.copy() if is_complex else p.real.copy() for p in pair))
-            context = None
             if stored["context"] is not None:
                 context = dict(self.tables["contexts"][stored["context"]])
                 context["system"] = self.systems[context["system"]]
             # older files hold no normal forms: they are computed when asked for
-            fields = {name: value for name, value in stored["fields"].items() if name != "criticality"}
-            made = TrackedEvent if "curve" in fields else Bifurcation
-            event = made(orbit=orbit, floquet=floquet, null_vectors=vectors, context=context, **fields)
+            plain = {name: value for name, value in stored["fields"].items() if name != "criticality"}
+            made = TrackedEvent if "curve" in plain else Bifurcation
+            event = made(orbit=orbit, floquet=floquet, null_vectors=vectors, context=context, **plain)
             events.append(event.with_normal_form(stored["normal_form"]) if "normal_form" in stored else event)
         return events
 
@@ -353,11 +287,11 @@ def diagram_to_datasets(diagram: BifurcationDiagram) -> dict[str, xarray.Dataset
     place = {id(event): i for node in nodes for i, event in enumerate(events_met(node.branch))}
     parents = [diagram.parent(node) for node in nodes]
     columns = {
-        "label": np.array([node.label for node in nodes]),
-        "period": np.array([node.branch.nu for node in nodes]),
-        "depth": np.array([node.depth for node in nodes]),
-        "parent": np.array([-1 if parent is None else parent.number for parent in parents]),
-        "origin": np.array([-1 if node.origin is None else place[id(node.origin)] for node in nodes]),
+        "label": [node.label for node in nodes],
+        "period": [node.branch.nu for node in nodes],
+        "depth": [node.depth for node in nodes],
+        "parent": [-1 if parent is None else parent.number for parent in parents],
+        "origin": [-1 if node.origin is None else place[id(node.origin)] for node in nodes],
     }
     record = {
         "failures": [[place[id(item)], why] for node in nodes for item, why in node.failures],
@@ -366,13 +300,11 @@ def diagram_to_datasets(diagram: BifurcationDiagram) -> dict[str, xarray.Dataset
         "left_of": [node.number for node in nodes for _ in node.left],
         "interruption": diagram.interruption,
     }
-    variables: dict[str, Any] = {
-        name: ("branch", values, {"long_name": _HEAD[name]}) for name, values in columns.items()
-    }
-    variables["record"] = ((), np.array(to_json(record)), {"long_name": "what was left out, as JSON"})
-    head = xarray.Dataset(variables, attrs={"branches": len(nodes), "stopped": diagram.stopped})
+    variables = {name: ("branch", np.array(columns[name]), {"long_name": meaning}) for name, meaning in _HEAD.items()}
+    attributes: dict[str, Any] = {"branches": len(nodes), "stopped": diagram.stopped}
     if diagram.seconds == diagram.seconds:
-        head.attrs["seconds"] = float(diagram.seconds)
+        attributes["seconds"] = float(diagram.seconds)
+    head = recorded(xarray.Dataset(variables, attrs=attributes), record, "what was left out, as JSON")
     return {"": head} | {f"branch_{node.number}": branch_to_dataset(node.branch) for node in nodes}
 
 
