@@ -128,24 +128,21 @@ def _markers(item: Markers | Beads, at: np.ndarray) -> dict[str, Any]:
 
 
 def _labels(labels: Sequence[Label], axes: Sequence[Axis]) -> dict[str, Any]:
-    """Texts beside points, each on a side where none is of the points nearby; the same text at the same place once."""
+    """Texts beside points; of those near each other, in units of the axes, one to the right, the next above, ..."""
     size = np.array([float(axis.high or 0.0) - float(axis.low or 0.0) for axis in axes])
     taken: list[tuple[np.ndarray, str, str]] = []
     for label in labels:
-        near = [(side, text) for at, side, text in taken if np.abs((at - label.at) / size).max() < _NEAR]
-        beside = [(other.at - label.at)[0] for other in labels if np.abs((other.at - label.at) / size).max() < _NEAR]
-        sides = _SIDES if max(beside) <= 0.0 else _SIDES[::-1]  # away from a point on the right
-        if label.text not in [text for _, text in near]:
-            free = [side for side in sides if side not in [other for other, _ in near]]
-            taken.append((label.at, (free or sides)[0], label.text))
+        near = [text for at, text, _ in taken if np.abs((at - label.at) / size).max() < _NEAR]
+        if label.text not in near:
+            taken.append((label.at, label.text, _SIDES[len(near) % len(_SIDES)]))
     return {
         "type": "scatter",
         "mode": "text",
         "name": "",
         "cliponaxis": False,
         **_coordinates(np.array([at for at, _, _ in taken]).T),
-        "text": [f"\u2002{html_of(text)}\u2002" for _, _, text in taken],
-        "textposition": [side for _, side, _ in taken],
+        "text": [f"\u2002{html_of(text)}\u2002" for _, text, _ in taken],
+        "textposition": [side for _, _, side in taken],
         "hoverinfo": "skip",
         "showlegend": False,
     }

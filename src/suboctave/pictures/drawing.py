@@ -6,7 +6,7 @@ it down for Plotly. Texts are those of Matplotlib, with formulas between dollar 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
@@ -109,15 +109,14 @@ class Band(_Seen):
 class Raster(_Seen):
     """Cells of one colour each, (rows, columns, 3), from the lower left, between ascending edges.
 
-    `hatched`, `dotted`, (rows, columns), bool: cells with strokes or dots besides. `scale`: colours with their values,
-    lowest and highest, and what they mean.
+    `hatches`: patterns of Matplotlib and which cells have them besides, (rows, columns), bool. `scale`: colours with
+    their values, lowest and highest, and what they mean.
     """
 
     cells: np.ndarray
     across: np.ndarray
     upwards: np.ndarray
-    hatched: np.ndarray | None = None
-    dotted: np.ndarray | None = None
+    hatches: Mapping[str, np.ndarray] = field(default_factory=dict)
     scale: tuple[Sequence[str], float, float, str] | None = None
 
 
@@ -134,14 +133,14 @@ class Label:
 
 @dataclass(frozen=True)
 class Entry:
-    """How a name is shown in the legend: a line, a marker or both, or a patch, perhaps with a marker in it."""
+    """How a name is shown in the legend: a line, a marker or both, or a patch, perhaps hatched."""
 
     pen: Pen | None = None
     mark: Mark | None = None
     patch: str | None = None
     edge: str | None = None
     opacity: float = 1.0
-    hatched: bool = False
+    hatch: str = ""
 
 
 @dataclass(frozen=True)
@@ -260,6 +259,11 @@ def ordered(entries: dict[str, Entry]) -> dict[str, Entry]:
         return (0, 0) if entries[name].mark is None else (3, 0)
 
     return {name: entries[name] for name in sorted(entries, key=rank)}
+
+
+#: hatches of cells whose motion does not repeat, or lies on an isola, and their colours
+STROKES, DOTS = "////", ".."
+HATCHES = {STROKES: style.SOFT, DOTS: style.INK}
 
 
 def dot(colour: str, size: float = 4.0) -> Mark:

@@ -17,7 +17,7 @@ import numpy as np
 from suboctave.errors import InputError, chosen_dof, suggest
 from suboctave.options import with_options
 from suboctave.pictures import style
-from suboctave.pictures.drawing import Axis, Band, Entry, Frame, Guide, Markers, Polyline, Raster, dot, plain
+from suboctave.pictures.drawing import STROKES, Axis, Band, Entry, Frame, Guide, Markers, Polyline, Raster, dot, plain
 from suboctave.pictures.layers import check_count
 from suboctave.pictures.options import Coordinates, PageOptions, View, as_multiple, shown_multiple
 from suboctave.pictures.paper import single
@@ -394,11 +394,11 @@ def plot_basins(
         if (labels == number).any():
             cells[labels == number] = rgb(colour)
             words = f"{name}: {100.0 * shares[name]:.1f} %" if name in shares else name
-            hatched = Entry(patch=colour, edge=style.SOFT, hatched=True)
+            hatched = Entry(patch=colour, edge=style.SOFT, hatch=STROKES)
             plain_entry = Entry(mark=Mark("s", 7.0, colour, style.SOFT, 0.5))
             frame.entries[words] = hatched if number == _APERIODIC else plain_entry
     x, y = _edges(basins["x"].to_numpy()), _edges(basins["y"].to_numpy())
-    frame.add(Raster(cells, x, y, labels == _APERIODIC, layer=0.0))
+    frame.add(Raster(cells, x, y, {STROKES: labels == _APERIODIC}, layer=0.0))
     for places in points or ():
         inside = (places >= (x[0], y[0])).all(axis=1) & (places <= (x[-1], y[-1])).all(axis=1)
         frame.add(Markers(places[inside].T, Mark("o", 4.5, "#ffffff"), cut=True, layer=4.0))

@@ -19,6 +19,7 @@ from suboctave.atomic import replace_file
 from suboctave.errors import InputError, path_of, suggest
 from suboctave.pictures import style
 from suboctave.pictures.drawing import (
+    HATCHES,
     Axis,
     Band,
     Beads,
@@ -50,9 +51,6 @@ SUFFIXES = (".png", ".svg", ".pdf")
 _METADATA: dict[str, dict[str, Any]] = {".png": {}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
 # Letters are part of the file: TrueType in PDF, as journals ask for, and outlines in SVG. No random names in SVG.
 _EMBEDDED: dict[Any, Any] = {"pdf.fonttype": 42, "svg.fonttype": "path", "svg.hashsalt": "suboctave"}
-_HATCH = "////"
-#: millimetres between the dots of cells, and how they are marked
-_DOTS, DOT = 2.6, style.Mark("o", 1.5, style.INK)
 #: inches of width of a figure from which a legend stands beside the frame, not below it
 _WIDE = 5.0
 #: lengths of the edges of the frame, one to another
@@ -107,13 +105,11 @@ def _in_plane(figure: Figure, drawing: Drawing, sheet: style.Sheet) -> None:
         figure.suptitle(drawing.title, fontsize=look.large, color=style.INK)
     _place(figure, frames, drawing, sheet)  # the frames have their places: what is spaced on paper comes now
     for axes, frame in zip(frames, drawing.frames, strict=True):
-        _add_spaced(axes, frame, look)
+        _add_beads(axes, frame, look)
         annotate(axes, frame.labels, look)
 
 
 def _place(figure: Figure, frames: Sequence[Axes], drawing: Drawing, sheet: style.Sheet) -> None:
-    from matplotlib.legend_handler import HandlerTuple
-
     entries, where = handles(drawing.entries, sheet.look), drawing.legend
     arrange(figure)  # a legend inside one of the frames moves nothing
     if where == "free" and any(_legend_inside(axes, entries, sheet) for axes in frames):
@@ -122,8 +118,7 @@ def _place(figure: Figure, frames: Sequence[Axes], drawing: Drawing, sheet: styl
         beside = where == "beside" and sheet.inches[0] >= _WIDE
         plain: dict[str, Any] = {"frameon": False, "handlelength": 2.2, "handleheight": 1.1}
         place = "outside right upper" if beside else "outside lower center"
-        handlers = {tuple: HandlerTuple(ndivide=1)}
-        fitting_legend(figure, entries, sheet, most=1 if beside else 2, loc=place, handler_map=handlers, **plain)
+        fitting_legend(figure, entries, sheet, most=1 if beside else 2, loc=place, **plain)
     elif entries:
         if sheet.named:
             _grow(figure, entries, sheet)
@@ -188,12 +183,13 @@ def _paint(axes: Axes, raster: Raster, look: style.Look, placed: dict[str, Any])
     from matplotlib.colors import LinearSegmentedColormap, Normalize
 
     axes.pcolormesh(raster.across, raster.upwards, raster.cells, rasterized=True, **placed)
-    if raster.hatched is not None and raster.hatched.any() and min(raster.hatched.shape) > 1:
-        middles = [0.5 * (edges[1:] + edges[:-1]) for edges in (raster.across, raster.upwards)]
-        strokes: Any = {"levels": [0.5, 1.5], "colors": "none", "hatches": [_HATCH], "zorder": raster.layer + 0.5}
-        filled = axes.contourf(*middles, raster.hatched.astype(float), **strokes)
-        filled.set_edgecolor(style.SOFT)
-        filled.set_linewidth(0.0)
+    for hatch, cells in raster.hatches.items():
+        if cells.any() and min(cells.shape) > 1:
+            middles = [0.5 * (edges[1:] + edges[:-1]) for edges in (raster.across, raster.upwards)]
+            strokes: Any = {"levels": [0.5, 1.5], "colors": "none", "hatches": [hatch], "zorder": raster.layer + 0.5}
+            filled = axes.contourf(*middles, cells.astype(float), **strokes)
+            filled.set_edgecolor(HATCHES[hatch])
+            filled.set_linewidth(0.0)
     if raster.scale is not None:
         colours, low, high, label = raster.scale
         shades = ScalarMappable(Normalize(low, high), LinearSegmentedColormap.from_list("scale", list(colours)))
@@ -203,32 +199,16 @@ def _paint(axes: Axes, raster: Raster, look: style.Look, placed: dict[str, Any])
         bar.ax.tick_params(labelsize=look.small)
 
 
-def _add_spaced(axes: Axes, frame: Frame, look: style.Look) -> None:
-    """Marks at equal distances on paper: along lines, and over the cells of rasters."""
+def _add_beads(axes: Axes, frame: Frame, look: style.Look) -> None:
+    """Marks at equal distances on paper along lines."""
     box = axes.get_window_extent()
     size = box.width / axes.figure.dpi * 25.4, box.height / axes.figure.dpi * 25.4
     low, high = np.array([axes.get_xlim(), axes.get_ylim()]).T
     for item in frame.items:
         if isinstance(item, Beads):
-            at, mark, cut = item.places(low, high, size), item.mark, False
-        elif isinstance(item, Raster) and item.dotted is not None:
-            at, mark, cut = _dots(item, size), DOT, True
-        else:
-            continue
-        if at.shape[1]:
-            beads = Markers(at, mark, cut, role=item.role, layer=item.layer + 0.5)
-            _draw(axes, beads, look, (1.0, 1.0))
-
-
-def _dots(raster: Raster, size: tuple[float, float]) -> np.ndarray:
-    """Places (2, dots) over the dotted cells, evenly spread on paper in rows that are set off."""
-    inside = np.asarray(raster.dotted)
-    columns, rows = (max(8, round(length / _DOTS)) for length in size)
-    across, up = np.meshgrid((np.arange(columns) + 0.5) / columns, (np.arange(rows) + 0.5) / rows)
-    across = across + np.where(np.arange(rows) % 2, 0.25, -0.25)[:, None] / columns
-    where = inside[(up * inside.shape[0]).astype(int), (across * inside.shape[1]).astype(int)]
-    (x0, x1), (y0, y1) = raster.across[[0, -1]], raster.upwards[[0, -1]]
-    return np.array([x0 + across[where] * (x1 - x0), y0 + up[where] * (y1 - y0)])
+            at = item.places(low, high, size)
+            if at.shape[1]:
+                _draw(axes, Markers(at, item.mark, role=item.role, layer=item.layer + 0.5), look, (1.0, 1.0))
 
 
 def handles(entries: Mapping[str, Entry], look: style.Look) -> dict[str, Any]:
@@ -241,10 +221,9 @@ def handles(entries: Mapping[str, Entry], look: style.Look) -> dict[str, Any]:
         line: dict[str, Any] = {"linestyle": "none"} if entry.pen is None else _line(entry.pen, look)
         handle: Any = Line2D([], [], **line, **({} if entry.mark is None else _marker(entry.mark, look)))
         if entry.patch is not None:
-            edge: dict[str, Any] = {"edgecolor": entry.edge or "none", "linewidth": 0.5 if entry.edge else 0.0}
-            hatch = _HATCH if entry.hatched else None
-            patch = Patch(facecolor=entry.patch, alpha=entry.opacity, hatch=hatch, **edge)
-            handle = patch if entry.mark is None else (patch, handle)
+            edge = HATCHES.get(entry.hatch, entry.edge)  # which is the colour of the hatches as well
+            drawn: dict[str, Any] = {"edgecolor": edge or "none", "linewidth": 0.5 if edge else 0.0}
+            handle = Patch(facecolor=entry.patch, alpha=entry.opacity, hatch=entry.hatch or None, **drawn)
         shown[name] = handle
     return shown
 

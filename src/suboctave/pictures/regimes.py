@@ -15,10 +15,10 @@ import numpy as np
 
 from suboctave.options import with_options
 from suboctave.pictures import style
-from suboctave.pictures.drawing import Axis, Entry, Frame, Polyline, Raster
+from suboctave.pictures.drawing import DOTS, Axis, Entry, Frame, Polyline, Raster
 from suboctave.pictures.layers import check_count
 from suboctave.pictures.options import PageOptions
-from suboctave.pictures.paper import DOT, single
+from suboctave.pictures.paper import single
 from suboctave.pictures.style import Pen, period_colour, rgb, tinted
 
 if TYPE_CHECKING:
@@ -76,12 +76,12 @@ def plot_regimes(
     across, upwards = (np.linspace(*own, count + 1) for own, count in zip(ranges, cells.shape[::-1], strict=True))
     image = np.array([rgb(colour) for colour in colours]).reshape(-1, 3)[cells]
     dotted = isolated[cells] if len(regimes) else np.zeros(cells.shape, dtype=bool)
-    frame = Frame([Raster(image, across, upwards, dotted=dotted, layer=0.0)])
+    frame = Frame([Raster(image, across, upwards, {DOTS: dotted}, layer=0.0)])
     for number in sorted(range(len(regimes)), key=lambda i: _rank(regimes[i])):
         if np.count_nonzero(cells == number) > smallest * cells.size:
-            mark = DOT if isolated[number] else None
+            hatch = DOTS if isolated[number] else ""
             words = regimes[number][0] if labels is None else labels[number]
-            frame.entries[words] = Entry(mark=mark, patch=colours[number], edge=style.SOFT)
+            frame.entries[words] = Entry(patch=colours[number], edge=style.SOFT, hatch=hatch)
     unnamed = len(np.unique(cells)) - len(frame.entries)
     if unnamed > 0:
         frame.entries[f"({unnamed} smaller ones)"] = Entry()
