@@ -39,12 +39,10 @@ if TYPE_CHECKING:
 _PORTRAIT, _HISTORY = (3.0, 2.9), (5.6, 2.0)
 #: most frames in one row
 _COLUMNS = 4
-#: inches of width below which captions and labels are cut short
-_NARROW = 1.9
-#: inches of width of a figure above which there is room for the most columns
-_WIDE = 5.0
-#: inches of one line of a caption
-_LINE = 0.13
+#: inches of width of a frame below which labels are cut short, and of a figure above which most columns have room
+_NARROW, _WIDE = 1.9, 5.0
+#: inches of a caption
+_CAPTION = 0.26
 
 
 @with_options(MotionOptions)
@@ -173,22 +171,17 @@ class MotionDrawing:
             raise InputError(f"the motions are of different degrees of freedom ({dofs}): choose one with dof=")
         self.datasets, self.view, self.overlay = datasets, view, overlay and count > 1
         self.title, self.path = given.get("title", ""), path
-        frames = 1 if overlay else count
-        self.columns = 1 if stacked else _columns(frames, size)
-        rows = math.ceil(frames / self.columns)
-        inches = _inches(size, self.columns, rows, cell)
-        self.narrow = inches[0] / self.columns < _NARROW
+        self.frames = [Frame() for _ in range(1 if overlay else count)]
+        self.columns, inches = _page(len(self.frames), 1 if stacked else _COLUMNS, size, cell)
+        width, named = inches[0] / self.columns, isinstance(size, str)
+        self.narrow = width < _NARROW
+        self.sheet = style.Sheet(inches, style.PRINT if named else style.look_of(width), named)
         captions = [("\n" if self.narrow and not overlay else ", ").join(parts) for parts in _captions(datasets, view)]
-        named = isinstance(size, str)
-        if named and not overlay and rows * self.columns > 1:  # room for what stands over the frames
-            inches = inches[0], inches[1] + rows * _LINE * (captions[0].count("\n") + (labels is not None))
-        self.sheet = style.Sheet(inches, style.PRINT if named else style.look_of(inches[0] / self.columns), named)
         self.names = captions if labels is None else [plain(label) for label in labels]
         periods = [period_of(dataset) for dataset in datasets]
         # in frames of their own motions of one period need not differ
         pens = curve_styles(datasets, self.names) if overlay else styles_of_periods(periods, [""] * count)
         self.pens = [Pen(pen.colour, pen.width if self.overlay else 1.0) for pen in pens]
-        self.frames = [Frame() for _ in range(frames)]
         if not self.overlay:
             for frame, name, caption in zip(self.frames, self.names, captions, strict=True):
                 frame.title = caption if labels is None else f"{name}\n{caption}"
@@ -253,22 +246,20 @@ def _captions(datasets: Sequence[xarray.Dataset], view: MotionView) -> list[list
     return captions
 
 
-def _columns(frames: int, size: str | tuple[float, float] | None) -> int:
-    """As few rows as fit, evenly filled."""
-    most = _COLUMNS if size is None or style.size_in_inches(size)[0] > _WIDE else _COLUMNS - 1
-    return math.ceil(frames / math.ceil(frames / most))
-
-
-def _inches(
-    size: str | tuple[float, float] | None, columns: int, rows: int, cell: tuple[float, float]
-) -> tuple[float, float]:
-    """Width and height of the figure: a named size gives the width, and height for its rows."""
+def _page(
+    frames: int, most: int, size: str | tuple[float, float] | None, cell: tuple[float, float]
+) -> tuple[int, tuple[float, float]]:
+    """Columns, evenly filled, and width and height in inches; a named size is the width, with height for all rows."""
+    width, height = (0.0, 0.0) if size is None else style.size_in_inches(size)
+    if size is not None and width <= _WIDE:
+        most = min(most, _COLUMNS - 1)
+    rows = math.ceil(frames / most)
+    columns = math.ceil(frames / rows)
     if size is None:
-        return 0.8 + cell[0] * columns, 0.7 + cell[1] * rows
-    width, height = style.size_in_inches(size)
-    if isinstance(size, str) and max(columns, rows) > 1:
-        return width, 0.55 + rows * min(height, 0.75 * cell[1], width / columns * cell[1] / cell[0])
-    return width, height
+        width, height = 0.8 + cell[0] * columns, 0.7 + cell[1] * rows
+    elif isinstance(size, str) and frames > 1:
+        height = 0.55 + rows * (_CAPTION + min(height, 0.75 * cell[1], width / columns * cell[1] / cell[0]))
+    return columns, (width, height)
 
 
 # -------------------------------------------------------------------------------------------------------------- spectra
@@ -279,7 +270,7 @@ _NOTHING = 1e-11
 _BEYOND = 0.3
 #: markers of one motion after another, in one frame
 _MARKERS = ("o", "s", "^", "D", "v")
-#: points of a marker, and how much smaller one in the legend is
+#: points of a marker, and share of that of one neglected
 _SIZE, _SMALLER = 0.62 * style.MARKER_SIZE, 0.8
 #: where the components that were solved for end
 _END = Pen(style.SOFT, 0.9, (0, (1.0, 1.5)))
@@ -321,7 +312,7 @@ def plot_spectrum(
     apart = 0.85 * 72.0 * drawn.sheet.inches[0] / (most * nu + 1.0) / drawn.sheet.look.marker
     decades = _decades(datasets, view, most)
     for index in drawn.lower_first:
-        _add(drawn, index, most, apart, decades[0] or 1e-300)
+        _add(drawn, index, most, min(_SIZE, max(0.8 * apart, 1.3)), decades[0] or 1e-300)
     if any(_end(dataset) + 0.5 / period_of(dataset) < most for dataset in datasets):
         drawn.last["neglected (estimated)"] = Entry(_END, Mark("o", 0.5 * style.MARKER_SIZE, "#ffffff"))
     text = r"frequency / $\omega_0$" if view.omega_reference else "frequency / forcing frequency"
@@ -354,37 +345,31 @@ def _components(dataset: xarray.Dataset, view: MotionView) -> dict[str, tuple[np
     return parts
 
 
-def _add(drawn: MotionDrawing, index: int, most: float, apart: float, foot: float) -> None:
-    """Add one motion's components to its frame, with markers `apart` points from each other, stems from `foot` on."""
+def _add(drawn: MotionDrawing, index: int, most: float, size: float, foot: float) -> None:
+    """Add one motion's components to its frame, with markers of this size, and stems from `foot` on."""
     dataset, view, overlay = drawn.datasets[index], drawn.view, drawn.overlay
     items, unit, nu = drawn.frame(index).items, _unit_of_axis(dataset, view), period_of(dataset)
     parts = _components(dataset, view)
-    largest = parts["component"][1].max()
     shape = _MARKERS[index % len(_MARKERS)] if overlay else _MARKERS[0]
-    look = drawn.sheet.look
-    size = min(_SIZE, max(0.8 * apart, 1.3 / look.marker))
-    stem = min(0.8, max(0.3 * apart * look.marker, 0.2) / look.line)
-    hollow = overlay and index > 0  # so that one behind it shows
+    hollow, rim = overlay and index > 0, min(1.0, size / _SIZE)  # so that one behind it shows
     for name, (at, height) in parts.items():
-        shown = (height > _NOTHING * largest) & (at <= most * (1.0 + 1e-9))
+        shown = (height > _NOTHING * parts["component"][1].max()) & (at <= most * (1.0 + 1e-9))
         periods = np.array([Fraction(round(m * nu), nu).denominator for m in at])
         for q in np.unique(periods[shown]):
             chosen, colour, solved = shown & (periods == q), period_colour(int(q)), name == "component"
             x, y = at[chosen] * unit, height[chosen]
-            rim = min(1.0, 0.25 * size * look.marker / look.edge)
             face = colour if solved and not hollow else "none" if solved else "#ffffff"
             mark = Mark(shape, size if solved else _SMALLER * size, face, colour, rim)
             if solved and not overlay:
                 gaps = np.full(x.size, np.nan)
                 stems = np.array([np.ravel([x, x, gaps], "F"), np.ravel([np.full(x.size, foot), y, gaps], "F")])
-                items.append(Polyline(stems, Pen(colour, stem), role="stem", layer=2.0))
+                items.append(Polyline(stems, Pen(colour, 0.5 * rim), role="stem", layer=2.0))
             items.append(Markers(np.array([x, y]), mark, cut=True, role=f"{name} {q}"))
             if solved:
                 words = r"at $k\,\omega$" if q == 1 else rf"at $k\,\omega/{q}$"
                 drawn.last.setdefault(words, Entry(mark=replace(mark, marker="o", size=_SIZE, face=colour)))
     if overlay:
-        plain_mark = Mark(shape, size, "none" if hollow else style.INK)
-        drawn.legend.setdefault(drawn.names[index], Entry(mark=plain_mark))
+        drawn.legend.setdefault(drawn.names[index], Entry(mark=Mark(shape, size, "none" if hollow else style.INK)))
     if _end(dataset) + 0.5 / nu < most:
         items.append(Guide((_end(dataset) + 0.5 / nu) * unit, _END, upright=True, role="truncation", layer=1.0))
 
