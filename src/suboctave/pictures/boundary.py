@@ -32,18 +32,19 @@ from suboctave.pictures.drawing import (
     plain,
 )
 from suboctave.pictures.isolas import CENTRE, MERGING, end_text, shade, split, with_ends
-from suboctave.pictures.layers import (
+from suboctave.pictures.options import Coordinates, View
+from suboctave.pictures.paper import figure_of
+from suboctave.pictures.strokes import (
+    Line,
     add_strokes,
     check_count,
     checked,
     differing,
     events_of,
     fixed_parameters,
+    line_through,
     named_axis,
 )
-from suboctave.pictures.options import Coordinates, View
-from suboctave.pictures.paper import figure_of
-from suboctave.pictures.strokes import Line, line_through
 from suboctave.pictures.style import Mark, Pen, period_colour, period_name, period_of, places_among, tinted
 
 if TYPE_CHECKING:

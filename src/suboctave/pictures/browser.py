@@ -16,7 +16,7 @@ import numpy as np
 
 from suboctave.pictures import style
 from suboctave.pictures.drawing import Axis, Beads, Drawing, Item, Label, Markers, Polyline, Region, Surface
-from suboctave.pictures.layers import DIGITS, spelt
+from suboctave.pictures.strokes import DIGITS, spelt
 
 SYMBOLS: dict[str | tuple[int, int, int], str] = {
     "o": "circle", "v": "triangle-down", "^": "triangle-up", "<": "triangle-left", ">": "triangle-right",

@@ -231,13 +231,18 @@ def _stations(path: np.ndarray, spacing: float) -> np.ndarray:
 
     At least one if it is not short; `path` and `spacing` in one unit of length.
     """
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=1)))])
+    along = lengths(path.T)
     length = float(along[-1])
     if not np.isfinite(length) or length < 0.25 * spacing:
         return np.empty((2, 0))
     count = max(1, round(length / spacing))
     at = (np.arange(count) + 0.5) * length / count
     return np.array([np.interp(at, along, row) for row in path])
+
+
+def lengths(path: np.ndarray) -> np.ndarray:
+    """Lengths along a polyline (vertices, axes) from its beginning to each vertex."""
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
 
 
 def event_rank(kind: str) -> tuple[int, str]:

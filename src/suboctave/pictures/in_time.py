@@ -18,10 +18,10 @@ from suboctave.errors import InputError, chosen_dof, suggest
 from suboctave.options import with_options
 from suboctave.pictures import style
 from suboctave.pictures.drawing import STROKES, Axis, Band, Entry, Frame, Guide, Markers, Polyline, Raster, dot, plain
-from suboctave.pictures.layers import check_count
 from suboctave.pictures.options import Coordinates, PageOptions, View, as_multiple, shown_multiple
 from suboctave.pictures.paper import single
 from suboctave.pictures.response import datasets_of, response_frame
+from suboctave.pictures.strokes import check_count
 from suboctave.pictures.style import Mark, Pen, period_colour, period_name, places_among, rgb, tinted
 
 if TYPE_CHECKING:

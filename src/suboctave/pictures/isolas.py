@@ -14,7 +14,7 @@ import numpy as np
 
 from suboctave.options import with_options
 from suboctave.pictures import style
-from suboctave.pictures.drawing import Axis, Frame, Polyline, Region
+from suboctave.pictures.drawing import Axis, Frame, Polyline, Region, lengths
 from suboctave.pictures.options import PageOptions
 from suboctave.pictures.paper import single
 from suboctave.pictures.style import Pen, period_colour, period_name, tinted
@@ -140,7 +140,7 @@ def _arcs(loop: np.ndarray, along: int, scale: np.ndarray) -> tuple[np.ndarray, 
 
 def _spread(arc: np.ndarray, scale: np.ndarray) -> np.ndarray:
     """Places at equal shares of the length of an arc, (3, samples)."""
-    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(arc / scale, axis=1), axis=0))])
+    length = lengths((arc / scale).T)
     return np.array([np.interp(np.linspace(0.0, length[-1], _SAMPLES), length, row) for row in arc])
 
 

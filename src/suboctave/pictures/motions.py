@@ -25,9 +25,9 @@ from suboctave.errors import InputError
 from suboctave.options import with_options
 from suboctave.pictures import style
 from suboctave.pictures.drawing import Axis, Drawing, Entry, Frame, Guide, Markers, Polyline, Ticks, plain
-from suboctave.pictures.layers import check_count, differing
 from suboctave.pictures.options import DERIVATIVES, HistoryOptions, MotionOptions, MotionView, SpectrumOptions
 from suboctave.pictures.paper import check_path, figure_of
+from suboctave.pictures.strokes import check_count, differing
 from suboctave.pictures.style import Mark, Pen, curve_styles, period_colour, period_name, period_of, styles_of_periods
 
 if TYPE_CHECKING:

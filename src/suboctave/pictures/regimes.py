@@ -16,9 +16,9 @@ import numpy as np
 from suboctave.options import with_options
 from suboctave.pictures import style
 from suboctave.pictures.drawing import DOTS, Axis, Entry, Frame, Polyline, Raster
-from suboctave.pictures.layers import check_count
 from suboctave.pictures.options import PageOptions
 from suboctave.pictures.paper import single
+from suboctave.pictures.strokes import check_count
 from suboctave.pictures.style import Pen, period_colour, rgb, tinted
 
 if TYPE_CHECKING:

@@ -26,10 +26,10 @@ from suboctave.pictures.boundary import boundary_drawing, boundary_names, is_bou
 from suboctave.pictures.browser import figure_data
 from suboctave.pictures.drawing import Drawing
 from suboctave.pictures.isolas import is_isolas, parameter_of
-from suboctave.pictures.layers import fixed_parameters, spelt
 from suboctave.pictures.paper import figure_of, image_of
 from suboctave.pictures.response import response_drawing
 from suboctave.pictures.space import space_drawing
+from suboctave.pictures.strokes import fixed_parameters, spelt
 from suboctave.pictures.style import period_name, period_of
 from suboctave.store.layout import check_layout, coordinate, parameter_column
 from suboctave.version import __version__
@@ -276,23 +276,26 @@ def _file_name(names: Sequence[str] | Mapping[str, Any]) -> str:
 _TEXT = "text"
 #: attributes of a dataset that have a place of their own on the page, or none
 _PLACED = {"layout", "suboctave", "system", "free", "ended", "closed", "period", "observed_dof", "dofs", "warnings"}
-_PLACED |= {"record", "digest", "contents", "tracked", "plane", "isola", "at"}
+_PLACED |= {"record", "digest", "contents", "tracked", "plane", "isola", "at", "seconds"}
 #: characters of an attribute from which it is folded away, and of a row of a table that stands beside its figure
 _LONG, _BESIDE = 400, 56
 
 
 @dataclass(frozen=True)
 class Table:
-    """Headings with their class ("", "text", "long"), and the cells of each row."""
+    """Columns: heading, class ("", "text", "long"), and the cells."""
 
-    head: Sequence[tuple[str, str]]
-    rows: Sequence[Sequence[str]]
+    columns: Sequence[tuple[str, str, Sequence[str]]]
+
+    @property
+    def rows(self) -> list[tuple[str, ...]]:
+        """The cells row by row."""
+        return list(zip(*(cells for _, _, cells in self.columns), strict=True))
 
     @property
     def wide(self) -> bool:
         """Whether there is no room for it beside a figure."""
-        columns = zip([name for name, _ in self.head], *self.rows, strict=True)
-        return sum(max(len(text) for text in column) for column in columns) > _BESIDE
+        return sum(max(map(len, (heading, *cells))) for heading, _, cells in self.columns) > _BESIDE
 
 
 def summary_of(dataset: xarray.Dataset) -> str:
@@ -312,36 +315,36 @@ def summary_of(dataset: xarray.Dataset) -> str:
 def bifurcations(dataset: xarray.Dataset) -> Table:
     """The located events of a curve, in the order met."""
     names = plane_of(dataset) if is_boundary(dataset) else (str(dataset.attrs["free"]),)
-    free = [name for name in names if name != "omega"]
-    values = [coordinate(dataset, name)[1] for name in free]
-    columns = {name: dataset[f"event_{name}"].to_numpy() for name in ("kind", "omega", "amplitude", "multiplier")}
-    residual, remarks = dataset["event_residual"].to_numpy(), _remarks(dataset)
-    own = ("kind", "ω", "max |x|", "multiplier", "residual", "remark")
-    head = [("kind", _TEXT), ("ω", ""), *((parameter_column(name, own), "") for name in free)]
-    head += [("max |x|", ""), ("multiplier", ""), ("residual", "")] + ([("remark", "long")] if any(remarks) else [])
-    rows = []
-    for i, remark in enumerate(remarks):
-        kind = str(columns["kind"][i])
-        name = style.kind_style(kind).name
-        row = [f"{kind} ({name})" if kind.isupper() and name != kind else name, f"{columns['omega'][i]:.9g}"]
-        row += [f"{value[i]:.9g}" for value in values]
-        row += [f"{columns['amplitude'][i]:.7g}", _number(complex(columns["multiplier"][i])), _small(residual[i])]
-        rows.append(row + ([remark] if any(remarks) else []))
-    return Table(head, rows)
+    own, remarks = ("kind", "ω", "max |x|", "multiplier", "residual", "remark"), _remarks(dataset)
+    kind, omega, amplitude, multiplier, residual = (
+        dataset[f"event_{name}"].to_numpy() for name in ("kind", "omega", "amplitude", "multiplier", "residual")
+    )
+    columns: list[tuple[str, str, Sequence[str]]] = [
+        ("kind", _TEXT, [_kind_words(str(name)) for name in kind]),
+        ("ω", "", _texts(omega)),
+        *((parameter_column(n, own), "", _texts(coordinate(dataset, n)[1])) for n in names if n != "omega"),
+        ("max |x|", "", _texts(amplitude, 7)),
+        ("multiplier", "", [_number(complex(mu)) for mu in multiplier]),
+        ("residual", "", [_small(value) for value in residual]),
+    ]
+    return Table([*columns, ("remark", "long", remarks)] if any(remarks) else columns)
+
+
+def _kind_words(kind: str) -> str:
+    name = style.kind_style(kind).name
+    return f"{kind} ({name})" if kind.isupper() and name != kind else name
 
 
 def _remarks(dataset: xarray.Dataset) -> list[str]:
     varied = spelt(str(dataset.attrs["free"]))
     doubt = dataset["event_uncertainty"].to_numpy()
-    nothing = np.full(doubt.shape, "")
-    extreme = dataset["event_extreme"].to_numpy() if "event_extreme" in dataset else nothing
-    contact, critical = dataset["event_contact"].to_numpy(), dataset["event_criticality"].to_numpy()
-    remarks = []
-    for i in range(len(doubt)):
-        words = [str(extreme[i]), str(critical[i]), f"± {doubt[i]:.0e} in {varied}" if doubt[i] else ""]
-        words.append(f"contact: {contact[i]}" if str(contact[i]) else "")
-        remarks.append("; ".join(filter(None, words)))
-    return remarks
+    texts = [
+        dataset["event_extreme"].to_numpy() if "event_extreme" in dataset else np.full(doubt.shape, ""),
+        dataset["event_criticality"].to_numpy(),
+        [f"± {value:.0e} in {varied}" if value else "" for value in doubt],
+        [f"contact: {contact}" if str(contact) else "" for contact in dataset["event_contact"].to_numpy()],
+    ]
+    return ["; ".join(filter(None, map(str, words))) for words in zip(*texts, strict=True)]
 
 
 def notes_on(dataset: xarray.Dataset) -> list[str]:
@@ -418,29 +421,24 @@ def _is_long(text: str) -> bool:
 
 def _attributes(dataset: xarray.Dataset) -> list[tuple[str, str]]:
     """The attributes of a curve that have no place elsewhere, as texts."""
-    pairs = []
-    for name, value in dataset.attrs.items():
-        if name == "seconds":
-            if _is_finite(value):
-                pairs.append(("time taken", f"{float(value):.3g} s"))
-        elif name not in _PLACED and str(value):
-            pairs.append((str(name), str(value)))
-    return pairs
+    seconds = float(dataset.attrs.get("seconds", math.nan))
+    taken = [("time taken", f"{seconds:.3g} s")] if math.isfinite(seconds) else []
+    return taken + [(str(name), str(v)) for name, v in dataset.attrs.items() if name not in _PLACED and str(v)]
 
 
 def isolas_table(head: xarray.Dataset) -> Table | None:
     """One row for each isola; None where there are none."""
     if not head.sizes["isola"]:
         return None
-    names = [("isola", ""), ("period", _TEXT), (f"{parameter_of(head)} from", ""), ("to", "")]
-    names += [("born at", ""), ("ω", ""), ("merges at", ""), ("ω", "")]
+    headings = (f"{parameter_of(head)} from", "to", "born at", "ω", "merges at", "ω")
     keys = ("from", "to", "born", "born_omega", "merges", "merges_omega")
-    values = np.array([head[key].to_numpy() for key in keys], dtype=float).T
-    rows = [
-        [str(i), period_name(int(nu)), *(f"{v:.9g}" if np.isfinite(v) else "–" for v in own)]
-        for i, (nu, own) in enumerate(zip(head["period"].to_numpy(), values, strict=True))
-    ]
-    return Table(names, rows)
+    return Table(
+        [
+            ("isola", "", [str(i) for i in range(head.sizes["isola"])]),
+            ("period", _TEXT, [period_name(int(nu)) for nu in head["period"].to_numpy()]),
+            *((name, "", _texts(head[key].to_numpy())) for name, key in zip(headings, keys, strict=True)),
+        ]
+    )
 
 
 def notes_on_isolas(head: xarray.Dataset) -> tuple[list[str], list[str]]:
@@ -456,9 +454,16 @@ def notes_on_isolas(head: xarray.Dataset) -> tuple[list[str], list[str]]:
 def columns_of(dataset: xarray.Dataset) -> Table:
     """A result that is no curve: its columns as they are."""
     columns = {str(name): data.to_numpy() for name, data in dataset.data_vars.items() if data.dims == ("row",)}
-    kinds = [_TEXT if column.dtype.kind in "OU" else "" for column in columns.values()]
-    rows = [[_cell(column[i]) for column in columns.values()] for i in range(dataset.sizes["row"])]
-    return Table(list(zip(columns, kinds, strict=True)), rows)
+    return Table(
+        [
+            (name, _TEXT if column.dtype.kind in "OU" else "", [_cell(value) for value in column])
+            for name, column in columns.items()
+        ]
+    )
+
+
+def _texts(values: np.ndarray, digits: int = 9) -> list[str]:
+    return [f"{value:.{digits}g}" if np.isfinite(value) else "–" for value in values]
 
 
 def _cell(value: Any) -> str:
@@ -477,10 +482,3 @@ def _number(value: complex) -> str:
 def _small(value: float) -> str:
     """A residual or an error."""
     return f"{value:.1e}" if math.isfinite(value) else "–"
-
-
-def _is_finite(value: Any) -> bool:
-    try:
-        return math.isfinite(float(value))
-    except (TypeError, ValueError, OverflowError):
-        return False

@@ -18,7 +18,9 @@ from suboctave.pictures import style
 from suboctave.pictures.boundary import boundary_names, boundary_styles, is_boundary, plot_boundaries
 from suboctave.pictures.drawing import Axis, Drawing, Entry, Frame, Markers, Ticks, plain
 from suboctave.pictures.isolas import is_isolas
-from suboctave.pictures.layers import (
+from suboctave.pictures.options import Coordinates, CurveOptions, View
+from suboctave.pictures.paper import draw, dress, figure_of, handles
+from suboctave.pictures.strokes import (
     Seen,
     add_strokes,
     check_count,
@@ -28,8 +30,6 @@ from suboctave.pictures.layers import (
     fixed_parameters,
     named_axis,
 )
-from suboctave.pictures.options import Coordinates, CurveOptions, View
-from suboctave.pictures.paper import draw, dress, figure_of, handles
 from suboctave.pictures.style import Pen, curve_styles, period_name, period_of, several_periods
 
 if TYPE_CHECKING:

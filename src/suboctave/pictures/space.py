@@ -30,11 +30,10 @@ from suboctave.pictures.boundary import (
 )
 from suboctave.pictures.drawing import Axis, Drawing, Entry, Frame, Markers, Surface, plain
 from suboctave.pictures.isolas import CENTRE, is_isolas, shade, split, surface, with_ends
-from suboctave.pictures.layers import add_strokes, checked, events_of, seen_as
 from suboctave.pictures.options import Coordinates, SpaceOptions, View
 from suboctave.pictures.paper import figure_of
 from suboctave.pictures.response import datasets_of
-from suboctave.pictures.strokes import cut, line_through
+from suboctave.pictures.strokes import add_strokes, checked, cut, events_of, line_through, seen_as
 from suboctave.pictures.style import Pen, period_colour, period_name, period_of, tinted
 from suboctave.store.layout import coordinate
 
