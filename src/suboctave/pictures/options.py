@@ -15,34 +15,14 @@ import numpy as np
 
 from suboctave.errors import InputError, suggest
 from suboctave.pictures.style import period_of
-from suboctave.store.layout import check_component, coordinate, has_component, reading_name
+from suboctave.store.layout import QUANTITIES, check_component, coordinate, has_component, reading_name
 
 if TYPE_CHECKING:
     import xarray
 
 
-# What the axis says, with {x} the observed displacement, {k} the harmonic, {e} the element.
-QUANTITIES = {
-    "amplitude": r"amplitude $\max\,|{x}|$",
-    "rms": r"RMS of ${x}$",
-    "velocity": r"velocity $\max\,|\dot{{{x}}}|$",
-    "velocity_rms": r"RMS of $\dot{{{x}}}$",
-    "acceleration": r"acceleration $\max\,|\ddot{{{x}}}|$",
-    "acceleration_rms": r"RMS of $\ddot{{{x}}}$",
-    "harmonic": r"harmonic {k} of ${x}$",  # of harmonic 0 see _MEAN
-    "phase": r"phase of harmonic {k} of ${x}$",
-    "peak_force": r"peak force, element {e}",
-    "contact_share": r"share of period in contact, element {e}",
-    "impacts": r"impacts per period, element {e}",
-    "transmitted_force": "peak force on the ground",
-    "transmissibility": "transmissibility",
-}
-_MEAN = r"mean of ${x}$, in modulus"
+_MEAN = r"mean of ${x}$, in modulus"  # which harmonic 0 is
 _FREQUENCIES = ("rad/s", "Hz")
-_NUMBERED = {"harmonic": "harmonic", "phase": "harmonic"} | dict.fromkeys(
-    ("peak_force", "contact_share", "impacts"), "element"
-)
-_OF_A_DOF = frozenset(list(QUANTITIES)[:8])
 #: what of a displacement may be shown: the order of its derivative by time
 DERIVATIVES = {"displacement": 0, "velocity": 1, "acceleration": 2}
 _DOTS = ("x", r"\dot{x}", r"\ddot{x}")
@@ -187,7 +167,7 @@ class View(Units):
             object.__setattr__(self, "quantity", "amplitude" if self.harmonic is None else "harmonic")
         if self.quantity not in QUANTITIES:
             raise InputError(f"unknown quantity {self.quantity!r}{suggest(str(self.quantity), QUANTITIES)}")
-        needs = _NUMBERED.get(self.quantity)
+        needs = QUANTITIES[self.quantity].numbered
         for name, given in (("harmonic", self.harmonic), ("element", self.element)):
             if given is not None and needs != name:
                 raise InputError(f"{name}={given!r} says nothing about the quantity {self.quantity!r}; leave it out")
@@ -195,7 +175,7 @@ class View(Units):
             object.__setattr__(self, "harmonic", as_multiple(self.harmonic))
         if needs == "element":
             _check_element(self.quantity, self.element)
-        if self.dof is not None and self.quantity not in _OF_A_DOF:
+        if self.dof is not None and not QUANTITIES[self.quantity].of_dof:
             raise InputError(f"the quantity {self.quantity!r} is not one of a degree of freedom: leave dof= out")
         super().__post_init__()
         for name, limits in (("xlim", self.xlim), ("ylim", self.ylim)):
@@ -207,9 +187,8 @@ class View(Units):
     @property
     def variable(self) -> str:
         """The variable of the dataset that is drawn: the name of a reading."""
-        needs = _NUMBERED.get(self.quantity)
-        number = {None: None, "element": self.element, "harmonic": self.multiple}[needs]
-        return reading_name(self.quantity, number, self.dof)
+        numbers = {"": None, "element": self.element, "harmonic": self.multiple}
+        return reading_name(self.quantity, numbers[QUANTITIES[self.quantity].numbered], self.dof)
 
     @property
     def multiple(self) -> float:
@@ -226,7 +205,7 @@ class View(Units):
         return [] if self.variable == "amplitude" or not self._has_component(nu) else [self.variable]
 
     def _has_component(self, nu: int) -> bool:
-        return _NUMBERED.get(self.quantity) != "harmonic" or has_component(self.multiple, nu)
+        return QUANTITIES[self.quantity].numbered != "harmonic" or has_component(self.multiple, nu)
 
     def completed(self, datasets: Sequence[xarray.Dataset]) -> list[xarray.Dataset]:
         """The datasets with the component that is drawn, also where motions have none at that frequency.
@@ -234,7 +213,7 @@ class View(Units):
         It is zero there, and its phase nan. InputError where none of the motions has it.
         """
         periods = [period_of(dataset) for dataset in datasets]
-        if _NUMBERED.get(self.quantity) == "harmonic":
+        if QUANTITIES[self.quantity].numbered == "harmonic":
             check_component(self.multiple, periods)
         nothing = math.nan if self.quantity == "phase" else 0.0
         return [
@@ -254,7 +233,7 @@ class View(Units):
         dofs = list(dict.fromkeys(int(dataset.attrs.get("observed_dof", 0)) for dataset in datasets))
         dofs = dofs if self.dof is None else [self.dof]
         x = "x_i" if len(dofs) > 1 else "x" if int(datasets[0].attrs.get("dofs", 1)) == 1 else f"x_{{{dofs[0]}}}"
-        says = _MEAN if self.quantity == "harmonic" and self.multiple == 0.0 else QUANTITIES[self.quantity]
+        says = _MEAN if self.quantity == "harmonic" and self.multiple == 0.0 else QUANTITIES[self.quantity].axis
         text = says.format(x=x, k=shown_multiple(self.multiple), e=self.element)
         return text + (f", $i$ = {', '.join(map(str, dofs))}" if len(dofs) > 1 and "{x}" in says else "")
 

@@ -39,7 +39,7 @@ from suboctave.harmonic.trigonometric import crossings, extrema, peak
 from suboctave.model.elements.smoothness import levels as levels_of
 from suboctave.model.inputs import check_element
 from suboctave.model.system import System
-from suboctave.store.layout import check_component, has_component, parameter_column, reading_name
+from suboctave.store.layout import QUANTITIES, check_component, has_component, parameter_column, reading_name
 
 if TYPE_CHECKING:
     import xarray
@@ -177,36 +177,27 @@ class Reading:
 
     def fits(self, nu: int) -> bool:
         """Whether motions of nu load periods have it: not a component between the multiples of omega/nu."""
-        return READINGS[self.what].numbered != "harmonic" or has_component(self.number or 0.0, nu)
+        return QUANTITIES[self.what].numbered != "harmonic" or has_component(self.number or 0.0, nu)
 
     def of(self, orbits: Sequence[PeriodicOrbit], observe: int) -> Array:
         """Its values, shape (len(orbits),)."""
         dof = observe if self.dof is None else self.dof
-        kind = READINGS[self.what]
-        if self.what in _OF_AN_ELEMENT and len(orbits):
+        if QUANTITIES[self.what].numbered == "element" and len(orbits):
             system = orbits[0].balance.system
             gapped = gapped_elements(system) if self.what in _OF_A_GAP else None
             check_element(system, int(self.number or 0), gapped)
-        values = np.array([kind.read(orbit, dof, self.number or 0.0) for orbit in orbits])
+        values = np.array([_READ[self.what](orbit, dof, self.number or 0.0) for orbit in orbits])
         return _phases(values) if self.what == "phase" else values.astype(float)
 
     def attributes(self, system: System) -> dict[str, str]:
         """What a dataset says of it: meaning and unit."""
-        kind = READINGS[self.what]
+        kind = QUANTITIES[self.what]
         meaning = kind.meaning
         if kind.numbered == "element":
             meaning += f", element {self.number:g}: {system.elements[int(self.number or 0)].label}"
         elif kind.numbered:
             meaning += f", harmonic {self.number:g}"
         return {"long_name": meaning, "units": kind.unit} | ({} if self.dof is None else {"dof": str(self.dof)})
-
-
-@dataclass(frozen=True)
-class _Kind:
-    read: Callable[[PeriodicOrbit, int, float], Any]
-    meaning: str
-    unit: str
-    numbered: str = ""
 
 
 def _force_ratio(orbit: PeriodicOrbit, harmonic: float | None, r: Array) -> float:
@@ -234,36 +225,23 @@ def _applied(orbit: PeriodicOrbit) -> np.ndarray:
     return ground_and_load(orbit, np.ones(orbit.balance.system.n))[1]
 
 
-def _ground(orbit: PeriodicOrbit) -> float:
-    return largest(ground_and_load(orbit, np.ones(orbit.balance.system.n))[0])
-
-
-READINGS: Mapping[str, _Kind] = {
-    "amplitude": _Kind(lambda o, dof, _: o.amplitude(dof), "max |x| over a period", "length"),
-    "rms": _Kind(lambda o, dof, _: o.rms(dof), "root mean square of x", "length"),
-    "velocity": _Kind(lambda o, dof, _: o.velocity_amplitude(dof), "max |dx/dt| over a period", "length / time"),
-    "velocity_rms": _Kind(lambda o, dof, _: o.rms(dof, 1), "root mean square of dx/dt", "length / time"),
-    "acceleration": _Kind(
-        lambda o, dof, _: o.acceleration_amplitude(dof), "max |d2x/dt2| over a period", "length / time^2"
-    ),
-    "acceleration_rms": _Kind(lambda o, dof, _: o.rms(dof, 2), "root mean square of d2x/dt2", "length / time^2"),
-    "harmonic": _Kind(lambda o, dof, k: abs(o.harmonic(k, dof)), "amplitude of x", "length", "harmonic"),
-    "phase": _Kind(lambda o, dof, k: o.harmonic(k, dof), "phase of x, negative where it lags", "rad", "harmonic"),
-    "peak_force": _Kind(lambda o, _, i: peak_force(o, int(i)), "largest |force| over a period", "force", "element"),
-    "contact_share": _Kind(lambda o, _, i: contact_of(o, int(i))[0], "share of the period in contact", "1", "element"),
-    "impacts": _Kind(
-        lambda o, _, i: contact_of(o, int(i))[1], "contacts begun per period of the motion", "1", "element"
-    ),
-    "transmitted_force": _Kind(lambda o, _dof, _: _ground(o), "largest |force| on the ground over a period", "force"),
-    "transmissibility": _Kind(
-        lambda o, _dof, _: _force_ratio(o, 1, np.ones(o.balance.system.n)),
-        "force on the ground over force applied, first harmonics",
-        "1",
-    ),
+_READ: Mapping[str, Callable[[PeriodicOrbit, int, float], Any]] = {
+    "amplitude": lambda orbit, dof, _: orbit.amplitude(dof),
+    "rms": lambda orbit, dof, _: orbit.rms(dof),
+    "velocity": lambda orbit, dof, _: orbit.velocity_amplitude(dof),
+    "velocity_rms": lambda orbit, dof, _: orbit.rms(dof, 1),
+    "acceleration": lambda orbit, dof, _: orbit.acceleration_amplitude(dof),
+    "acceleration_rms": lambda orbit, dof, _: orbit.rms(dof, 2),
+    "harmonic": lambda orbit, dof, k: abs(orbit.harmonic(k, dof)),
+    "phase": lambda orbit, dof, k: orbit.harmonic(k, dof),
+    "peak_force": lambda orbit, _, index: peak_force(orbit, int(index)),
+    "contact_share": lambda orbit, _, index: contact_of(orbit, int(index))[0],
+    "impacts": lambda orbit, _, index: contact_of(orbit, int(index))[1],
+    "transmitted_force": lambda orbit, _dof, _: largest(ground_and_load(orbit, np.ones(orbit.balance.system.n))[0]),
+    "transmissibility": lambda orbit, _dof, _: _force_ratio(orbit, 1, np.ones(orbit.balance.system.n)),
 }
 _OF_A_DOF = ("rms", "velocity", "velocity_rms", "acceleration", "acceleration_rms")
 _OF_A_GAP = ("contact_share", "impacts")
-_OF_AN_ELEMENT = ("peak_force", *_OF_A_GAP)
 _NAME = re.compile(r"(?P<what>[a-z]+(?:_[a-z]+)*?)(?:_(?P<number>\d+(?:\.\d+|/0*[1-9]\d*)?))?(?:_dof(?P<dof>\d+))?")
 
 
@@ -271,14 +249,14 @@ def read_reading(name: str) -> Reading:
     """The read-off of a name; InputError, with a suggestion, for one that is none."""
     match = _NAME.fullmatch(str(name))
     what = match["what"] if match else str(name)
-    if match is None or what not in READINGS:
-        raise InputError(f"there is no reading {name!r}{suggest(what, READINGS)}")
-    kind = READINGS[what]
+    if match is None or what not in QUANTITIES:
+        raise InputError(f"there is no reading {name!r}{suggest(what, QUANTITIES)}")
+    kind = QUANTITIES[what]
     if bool(kind.numbered) != (match["number"] is not None):
         wanted = f"{what}_1" if kind.numbered else what
         needs = f"needs the number of the {kind.numbered}" if kind.numbered else "takes no number"
         raise InputError(f"the reading {name!r} {needs}: write {wanted!r}")
-    if match["dof"] is not None and what not in ("amplitude", *_OF_A_DOF, "harmonic", "phase"):
+    if match["dof"] is not None and not kind.of_dof:
         raise InputError(f"the reading {what!r} is not one of a degree of freedom: write it without _dof{match['dof']}")
     if what == "amplitude" and match["dof"] is None:
         raise InputError("the amplitude of the observed DOF is there anyway; of another one it is 'amplitude_dof1'")
@@ -297,7 +275,7 @@ def shared(names: Iterable[str] | bool, periods: Sequence[int]) -> list[list[str
         return [names for _ in periods]
     chosen = {name: read_reading(name) for name in ([names] if isinstance(names, str) else names)}
     for reading in chosen.values():
-        if READINGS[reading.what].numbered == "harmonic":
+        if QUANTITIES[reading.what].numbered == "harmonic":
             check_component(reading.number or 0.0, periods)
     return [[name for name, reading in chosen.items() if reading.fits(nu)] for nu in periods]
 

@@ -322,7 +322,46 @@ def _others_unstable(multipliers: np.ndarray, critical: complex) -> bool:
     return bool(np.any(np.abs(np.delete(multipliers, skip)) > 1.0))
 
 
-# ---------------------------------------------------------------------------------------------------------- names
+# ----------------------------------------------------------------------------------------------------- quantities
+@dataclass(frozen=True)
+class Quantity:
+    """What is read off motions: its meaning and unit, what an axis says, the number that it needs, whether of a DOF.
+
+    `axis`, with {x} the displacement, {k} the harmonic, {e} the element.
+    """
+
+    meaning: str
+    unit: str
+    axis: str
+    numbered: str = ""
+    of_dof: bool = False
+
+
+QUANTITIES: Mapping[str, Quantity] = {
+    "amplitude": Quantity("max |x| over a period", "length", r"amplitude $\max\,|{x}|$", of_dof=True),
+    "rms": Quantity("root mean square of x", "length", r"RMS of ${x}$", of_dof=True),
+    "velocity": Quantity("max |dx/dt| over a period", "length / time", r"velocity $\max\,|\dot{{{x}}}|$", of_dof=True),
+    "velocity_rms": Quantity("root mean square of dx/dt", "length / time", r"RMS of $\dot{{{x}}}$", of_dof=True),
+    "acceleration": Quantity(
+        "max |d2x/dt2| over a period", "length / time^2", r"acceleration $\max\,|\ddot{{{x}}}|$", of_dof=True
+    ),
+    "acceleration_rms": Quantity(
+        "root mean square of d2x/dt2", "length / time^2", r"RMS of $\ddot{{{x}}}$", of_dof=True
+    ),
+    "harmonic": Quantity("amplitude of x", "length", r"harmonic {k} of ${x}$", "harmonic", of_dof=True),
+    "phase": Quantity(
+        "phase of x, negative where it lags", "rad", r"phase of harmonic {k} of ${x}$", "harmonic", of_dof=True
+    ),
+    "peak_force": Quantity("largest |force| over a period", "force", "peak force, element {e}", "element"),
+    "contact_share": Quantity(
+        "share of the period in contact", "1", "share of period in contact, element {e}", "element"
+    ),
+    "impacts": Quantity("contacts begun per period of the motion", "1", "impacts per period, element {e}", "element"),
+    "transmitted_force": Quantity("largest |force| on the ground over a period", "force", "peak force on the ground"),
+    "transmissibility": Quantity("force on the ground over force applied, first harmonics", "1", "transmissibility"),
+}
+
+
 def reading_name(what: str, number: float | None = None, dof: int | None = None) -> str:
     """The name that a read-off is stored under: "velocity", "harmonic_3", "harmonic_0.5", "peak_force_0_dof1".
 
