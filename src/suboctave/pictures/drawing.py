@@ -63,7 +63,12 @@ class Beads(_Seen):
     def places(self, low: np.ndarray, high: np.ndarray, size: tuple[float, float]) -> np.ndarray:
         """Where they are, (axes, places), in a frame from `low` to `high` that is so many millimetres wide and high."""
         per_unit = (np.array(size) / (high - low))[:, None]
-        spots = _stations((self.at - low[:, None]) * per_unit, _SPACING)
+        path = (self.at - low[:, None]) * per_unit
+        along = lengths(path.T)
+        if not np.isfinite(along[-1]) or along[-1] < 0.25 * _SPACING:
+            return np.empty((2, 0))
+        count = max(1, round(along[-1] / _SPACING))  # none at the ends
+        spots = np.array([np.interp((np.arange(count) + 0.5) * along[-1] / count, along, row) for row in path])
         inside = np.all((spots >= 0.0) & (spots <= np.array(size)[:, None]), axis=0)
         near = (self.clear - low[:, None]) * per_unit
         distance = np.linalg.norm(spots[:, :, None] - near[:, None, :], axis=0).min(axis=1, initial=np.inf)
@@ -194,8 +199,8 @@ class Drawing:
     """One or several frames on the same axes, with one legend.
 
     `legend`: "free" is inside the frame where there is room, else above; "outside" above in any case; "beside" and
-    "below" the frame, without a box. `by_kind`: curves first in it, then kinds in the order of their table. `title`
-    stands above all frames; titles of frames are `small` where they are captions.
+    "below" the frame, without a box. `by_kind`: its order. `title` stands above all frames; titles of frames are
+    `small` where they are captions.
     """
 
     axes: Sequence[Axis]
@@ -211,9 +216,21 @@ class Drawing:
 
     @property
     def entries(self) -> dict[str, Entry]:
-        """What the legend shows, by name."""
+        """What the legend shows, by name; by kind: curves first, stable and unstable, kinds, then a user's own."""
         every = {name: entry for frame in self.frames for name, entry in frame.entries.items()}
-        return ordered(every) if self.by_kind else every
+        if not self.by_kind:
+            return every
+        lines = ["stable", "unstable"]
+        kinds = [name for look in style.KINDS.values() for name in (look.name, f"{look.name}{style.SUBCRITICAL}")]
+
+        def rank(name: str) -> tuple[int, int]:
+            if name in lines:
+                return 1, lines.index(name)
+            if name in kinds:
+                return 2, kinds.index(name)
+            return (0, 0) if every[name].mark is None else (3, 0)
+
+        return {name: every[name] for name in sorted(every, key=rank)}
 
 
 def extent(items: Iterable[Item]) -> tuple[np.ndarray, np.ndarray]:
@@ -226,20 +243,6 @@ def extent(items: Iterable[Item]) -> tuple[np.ndarray, np.ndarray]:
     )
 
 
-def _stations(path: np.ndarray, spacing: float) -> np.ndarray:
-    """Places, (2, places), at about equal distances along a polyline (2, vertices), none at its ends.
-
-    At least one if it is not short; `path` and `spacing` in one unit of length.
-    """
-    along = lengths(path.T)
-    length = float(along[-1])
-    if not np.isfinite(length) or length < 0.25 * spacing:
-        return np.empty((2, 0))
-    count = max(1, round(length / spacing))
-    at = (np.arange(count) + 0.5) * length / count
-    return np.array([np.interp(at, along, row) for row in path])
-
-
 def lengths(path: np.ndarray) -> np.ndarray:
     """Lengths along a polyline (vertices, axes) from its beginning to each vertex."""
     return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
@@ -249,21 +252,6 @@ def event_rank(kind: str) -> tuple[int, str]:
     """The place of a kind of event in a legend: as in the table of styles, then a user's own."""
     order = list(style.KINDS)
     return (order.index(kind) if kind in order else len(order)), kind
-
-
-def ordered(entries: dict[str, Entry]) -> dict[str, Entry]:
-    """Curves first, then stable and unstable, then the kinds in the order of the style table, then a user's own."""
-    lines = ["stable", "unstable"]
-    kinds = [name for look in style.KINDS.values() for name in (look.name, f"{look.name}{style.SUBCRITICAL}")]
-
-    def rank(name: str) -> tuple[int, int]:
-        if name in lines:
-            return 1, lines.index(name)
-        if name in kinds:
-            return 2, kinds.index(name)
-        return (0, 0) if entries[name].mark is None else (3, 0)
-
-    return {name: entries[name] for name in sorted(entries, key=rank)}
 
 
 #: hatches of cells whose motion does not repeat, or lies on an isola, and their colours

@@ -53,7 +53,7 @@ _METADATA: dict[str, dict[str, Any]] = {".png": {}, ".svg": {"Date": None}, ".pd
 _EMBEDDED: dict[Any, Any] = {"pdf.fonttype": 42, "svg.fonttype": "path", "svg.hashsalt": "suboctave"}
 #: inches of width of a figure from which a legend stands beside the frame, not below it
 _WIDE = 5.0
-#: lengths of the edges of the frame, one to another
+#: lengths of the edges of the frame in space, one to another
 _ASPECT = (1.5, 1.15, 0.95)
 #: inches of width of a page below which there are fewer ticks, and labels closer to their axes
 _SMALL = 4.2
@@ -289,7 +289,6 @@ def _dress_space(axes: Any, labels: list[str], sheet: style.Sheet) -> None:
         axis.line.set_linewidth(0.53 * look.line)
         axis.set_major_locator(MaxNLocator(nbins=4 if small else 5, steps=[1, 2, 2.5, 5, 10]))
     axes.tick_params(labelsize=look.small, color=style.INK, pad=(-0.3 if small else -0.1) * look.small)
-    axes.set_box_aspect(_ASPECT)
 
 
 def _fill_page(figure: Figure, axes: Any, drawing: Drawing, sheet: style.Sheet) -> None:
@@ -303,8 +302,7 @@ def _fill_page(figure: Figure, axes: Any, drawing: Drawing, sheet: style.Sheet) 
         top -= 2.0 * look.large / 72.0 * figure.dpi / whole
     legend = fitting_legend(figure, entries, sheet, loc="upper center", bbox_to_anchor=(0.5, top))
     top = legend.get_window_extent().y0 / whole
-    zoom, corner = 1.0, np.zeros(2)
-    room = np.array([figure.bbox.width, top * whole])
+    zoom, corner, room = 1.0, np.zeros(2), np.array([figure.bbox.width, top * whole])
     for _ in range(4):  # letters do not grow with the frame, so that a few rounds are needed
         axes.set_position((*corner, 1.0, top))
         axes.set_box_aspect(_ASPECT, zoom=zoom)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
@@ -261,17 +261,23 @@ def add_strokes(
     In the plane strokes are smooth, and dashes are not drawn
     upon those of `earlier` curves, in a frame of width and height `spread`.
     """
-    hover, strokes = Hover(dataset), cut(dataset, line_through(dataset, *axes.of(dataset)))
+    hover, strokes = hover_of(dataset), cut(dataset, line_through(dataset, *axes.of(dataset)))
     if earlier is not None:
         strokes = without_repeats(strokes, earlier.setdefault(pen, []), spread)
     for stroke in strokes:
         at = stroke.at if floor is None else np.vstack([stroke.at[:2], np.full(stroke.at.shape[1], floor)])
         role, name, group = seen[stroke.stable]
-        texts = partial(hover.along, stroke)
+        texts = partial(_along, stroke, hover)
         drawn: dict[str, Any] = {"smooth": earlier is not None, "role": role, "layer": layer, "hover": texts}
         own = pen.along(stroke.stable if floor is None else None)
         frame.items.append(Polyline(at, own, name=name, group=group, **drawn))
     return {stroke.stable for stroke in strokes}
+
+
+def _along(stroke: Stroke, hover: Callable[[], tuple[list[str], list[str]]]) -> list[str]:
+    """What is said of every vertex of a stroke."""
+    points, events = hover()
+    return [events[e] if e >= 0 else points[p] for p, e in zip(stroke.point, stroke.event, strict=True)]
 
 
 def events_of(
@@ -281,11 +287,12 @@ def events_of(
 
     `marked`, (events,), bool: which of them.
     """
-    places, hover = axes.of(dataset)[1], Hover(dataset)
+    places, hover = axes.of(dataset)[1], hover_of(dataset)
     for kind, look, every in style.marks(dataset):
         which = every[marked[every]]
         if which.size:
-            yield kind, look, {"at": places[:, which], "role": kind, "hover": partial(hover.of_events, which)}
+            texts = partial(lambda which: [hover()[1][index] for index in which], which)
+            yield kind, look, {"at": places[:, which], "role": kind, "hover": texts}
 
 
 # ---------------------------------------------------------------------------------------------------------------- words
@@ -312,46 +319,31 @@ def differing(values: Sequence[Mapping[str, float]], digits: int = 6) -> list[li
     return [[f"{name} = {own[name]:.{digits}g}" for name in names] for own in values]
 
 
-class Hover:
-    """What is said of the points and events of a curve: omega, free parameters, amplitude, a multiplier."""
+def hover_of(dataset: xarray.Dataset) -> Callable[[], tuple[list[str], list[str]]]:
+    """What is said of the points and events of a curve: omega, free parameters, amplitude, a multiplier.
 
-    def __init__(self, dataset: xarray.Dataset) -> None:
-        self._dataset = dataset
+    Put together when it is first asked for: on paper nothing hovers.
+    """
 
-    @functools.cached_property
-    def _free(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-        """Values of the free parameters at points and events."""
-        attrs = self._dataset.attrs
+    @functools.cache
+    def texts() -> tuple[list[str], list[str]]:
+        attrs, known = dataset.attrs, dataset.sizes.get("multiplier", 0) > 0
         plane = str(attrs.get("plane", "")).split("\n") if attrs.get("tracked") else []
-        return {name: coordinate(self._dataset, name) for name in [*plane, str(attrs["free"])] if name != "omega"}
+        names = ["omega", *(name for name in dict.fromkeys([*plane, str(attrs["free"])]) if name != "omega")]
+        leading = dataset["multipliers"].to_numpy()[:, 0] if known else np.full(dataset.sizes["point"], np.nan)
+        multipliers, both = (leading, dataset["event_multiplier"].to_numpy()), []
+        for here, prefix, which in ((0, "", "leading"), (1, "event_", "critical")):
+            values = [(spelt(name), coordinate(dataset, name)[here]) for name in names]
+            every = []
+            for i, amplitude in enumerate(dataset[f"{prefix}amplitude"].to_numpy()):
+                lines = [f"{name} = {column[i]:.{DIGITS}g}" for name, column in values]
+                lines.append(f"amplitude = {amplitude:.7g}")
+                mu = complex(multipliers[here][i])
+                if np.isfinite(mu):
+                    shown = f"{mu.real:.5g}" if abs(mu.imag) < 1e-7 else f"{mu.real:.5g} {mu.imag:+.5g}i"
+                    lines.append(f"{which} multiplier = {shown}, modulus {abs(mu):.5g}")
+                every.append("\n".join(lines))
+            both.append(every)
+        return both[0], both[1]
 
-    @functools.cached_property
-    def _columns(self) -> tuple[tuple[np.ndarray, ...], tuple[np.ndarray, ...]]:
-        """Omega, amplitude and a multiplier at points and events."""
-        data = self._dataset
-        known = "multipliers" in data and data.sizes.get("multiplier", 0) > 0
-        leading = data["multipliers"].to_numpy()[:, 0] if known else np.full(data.sizes["point"], np.nan + 0.0j)
-        points = (data["omega"].to_numpy(), data["amplitude"].to_numpy(), leading)
-        return points, tuple(data[f"event_{name}"].to_numpy() for name in ("omega", "amplitude", "multiplier"))
-
-    def along(self, stroke: Stroke) -> list[str]:
-        """Of every vertex of a stroke."""
-        return [
-            self._text(int(event), True) if event >= 0 else self._text(int(point), False)
-            for point, event in zip(stroke.point, stroke.event, strict=True)
-        ]
-
-    def of_events(self, which: np.ndarray) -> list[str]:
-        """Of some events, by number."""
-        return [self._text(int(index), True) for index in which]
-
-    def _text(self, index: int, at_event: bool) -> str:
-        omega, amplitude, multiplier = (column[index] for column in self._columns[at_event])
-        lines = [f"{spelt('omega')} = {omega:.{DIGITS}g}"]
-        lines += [f"{name} = {at[at_event][index]:.{DIGITS}g}" for name, at in self._free.items()]
-        lines.append(f"amplitude = {amplitude:.7g}")
-        mu = complex(multiplier)
-        if np.isfinite(mu):
-            shown = f"{mu.real:.5g}" if abs(mu.imag) < 1e-7 else f"{mu.real:.5g} {mu.imag:+.5g}i"
-            lines.append(f"{'critical' if at_event else 'leading'} multiplier = {shown}, modulus {abs(mu):.5g}")
-        return "\n".join(lines)
+    return texts

@@ -129,15 +129,11 @@ class BranchReadings:
     def motion_ratio(self, dof: int, reference: int, harmonic: float | None = 1) -> Array:
         """Amplitude of one DOF over that of another, at `harmonic`, or by largest values (None)."""
 
-        def ratio(orbit: PeriodicOrbit) -> float:
-            pair = (
-                (orbit.amplitude(dof), orbit.amplitude(reference))
-                if harmonic is None
-                else (abs(orbit.harmonic(harmonic, dof)), abs(orbit.harmonic(harmonic, reference)))
-            )
-            return pair[0] / pair[1] if pair[1] else np.nan
+        def size(orbit: PeriodicOrbit, of: int) -> float:
+            return orbit.amplitude(of) if harmonic is None else abs(orbit.harmonic(harmonic, of))
 
-        return self._over(ratio)
+        below = self._over(lambda orbit: size(orbit, reference))
+        return self._over(lambda orbit: size(orbit, dof)) / np.where(below == 0.0, np.nan, below)
 
     def reading(self, name: str) -> Array:
         """A read-off by the name under which `to_xarray` and `to_dataframe` store it, such as "velocity_rms".
@@ -157,7 +153,8 @@ class BranchReadings:
         orbit = self.orbits[0]
         if orbit.balance.size == self.system.n:
             names.append("transmitted_force")
-            if any(of_harmonic(_applied(o), 1, o.basis.nu) for o in self.orbits):
+            r = np.ones(self.system.n)
+            if any(of_harmonic(ground_and_load(o, r)[1], 1, o.basis.nu) for o in self.orbits):
                 names.append("transmissibility")
         return names
 
@@ -175,10 +172,6 @@ class Reading:
         """The name that it is stored under."""
         return reading_name(self.what, self.number, self.dof)
 
-    def fits(self, nu: int) -> bool:
-        """Whether motions of nu load periods have it: not a component between the multiples of omega/nu."""
-        return QUANTITIES[self.what].numbered != "harmonic" or has_component(self.number or 0.0, nu)
-
     def of(self, orbits: Sequence[PeriodicOrbit], observe: int) -> Array:
         """Its values, shape (len(orbits),)."""
         dof = observe if self.dof is None else self.dof
@@ -187,7 +180,12 @@ class Reading:
             gapped = gapped_elements(system) if self.what in _OF_A_GAP else None
             check_element(system, int(self.number or 0), gapped)
         values = np.array([_READ[self.what](orbit, dof, self.number or 0.0) for orbit in orbits])
-        return _phases(values) if self.what == "phase" else values.astype(float)
+        if self.what != "phase":
+            return values.astype(float)
+        phases = np.where(values == 0.0, np.nan, np.angle(values))
+        there = np.isfinite(phases)
+        phases[there] = np.unwrap(phases[there])
+        return phases
 
     def attributes(self, system: System) -> dict[str, str]:
         """What a dataset says of it: meaning and unit."""
@@ -219,10 +217,6 @@ def _somewhere(ratios: Array, harmonic: float | None) -> Array:
             "or compare motions (motion_ratio)"
         )
     return ratios
-
-
-def _applied(orbit: PeriodicOrbit) -> np.ndarray:
-    return ground_and_load(orbit, np.ones(orbit.balance.system.n))[1]
 
 
 _READ: Mapping[str, Callable[[PeriodicOrbit, int, float], Any]] = {
@@ -274,10 +268,10 @@ def shared(names: Iterable[str] | bool, periods: Sequence[int]) -> list[list[str
     if isinstance(names, bool):
         return [names for _ in periods]
     chosen = {name: read_reading(name) for name in ([names] if isinstance(names, str) else names)}
-    for reading in chosen.values():
-        if QUANTITIES[reading.what].numbered == "harmonic":
-            check_component(reading.number or 0.0, periods)
-    return [[name for name, reading in chosen.items() if reading.fits(nu)] for nu in periods]
+    components = {n: r.number or 0.0 for n, r in chosen.items() if QUANTITIES[r.what].numbered == "harmonic"}
+    for k in components.values():
+        check_component(k, periods)
+    return [[n for n in chosen if n not in components or has_component(components[n], nu)] for nu in periods]
 
 
 def with_readings(
@@ -314,13 +308,6 @@ def _listed(branch: Any, names: Iterable[str] | bool) -> list[Reading]:
         raise InputError(f"readings must be names, or True for all, not {shortened(names)}")
     chosen = [names] if isinstance(names, str) else list(names)
     return [read_reading(name) for name in dict.fromkeys(chosen)]
-
-
-def _phases(amplitudes: np.ndarray) -> Array:
-    phases = np.where(amplitudes == 0.0, np.nan, np.angle(amplitudes))
-    there = np.isfinite(phases)
-    phases[there] = np.unwrap(phases[there])
-    return phases
 
 
 # ----------------------------------------------------------------------------------- contacts: force, duration, impacts

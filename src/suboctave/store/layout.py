@@ -187,15 +187,22 @@ def curve_dataset(
         if not 0 <= row.after < count:
             raise InputError(f"event {row.kind} lies after point {row.after} of a curve of {count} points")
 
-    variables: dict[str, Any] = {"parameters": (("point", "parameter"), np.array([*values.values()]).T)}
-    if not values:
-        variables["parameters"] = (("point", "parameter"), np.empty((count, 0)))
+    columns = np.array([*values.values()]).reshape(len(values), count)
+    variables: dict[str, Any] = {"parameters": (("point", "parameter"), columns.T)}
     for name, (kind, meaning) in _POINTS.items():
         rows = amplitude if name == "amplitude" else given.get(name)
         if rows is not None:
             dims = ("point", "multiplier") if name in _TABLES else ("point",)
             variables[name] = (dims, _points(name, rows, count, kind, len(dims)), {"long_name": meaning})
-    variables |= _event_variables(events, values)
+    fields = {name: [getattr(row, name) for row in events] for name in _EVENTS}
+    fields["criticality"] = [word or "" for word in fields["criticality"]]
+    fields["stable_after"] = [UNKNOWN if stable is None else int(stable) for stable in fields["stable_after"]]
+    for name, (kind, meaning) in _EVENTS.items():
+        column: np.ndarray = np.array(fields[name], dtype=kind)
+        variables[f"event_{name}"] = ("event", column, {"long_name": meaning} if meaning else {})
+    there = [[row.parameters.get(name, values[name][row.after]) for name in values] for row in events]
+    table = np.array(there, dtype=float).reshape(len(events), len(values))
+    variables["event_parameters"] = (("event", "parameter"), table)
 
     coords: dict[str, Any] = {
         "omega": ("point", frequency, {"long_name": "circular forcing frequency", "units": "rad per unit time"}),
@@ -211,20 +218,6 @@ def curve_dataset(
             raise InputError(f"option {name!r} would overwrite an attribute of the layout")
         attributes[name] = value
     return xarray.Dataset(variables, coords, attributes)
-
-
-def _event_variables(events: Sequence[EventRow], values: Mapping[str, np.ndarray]) -> dict[str, Any]:
-    """The variables on the dimension `event`; `values`: the parameters at the points."""
-    columns = {name: [getattr(row, name) for row in events] for name in _EVENTS}
-    columns["criticality"] = [word or "" for word in columns["criticality"]]
-    columns["stable_after"] = [UNKNOWN if stable is None else int(stable) for stable in columns["stable_after"]]
-    variables: dict[str, Any] = {
-        f"event_{name}": ("event", np.array(columns[name], dtype=kind), {"long_name": meaning} if meaning else {})
-        for name, (kind, meaning) in _EVENTS.items()
-    }
-    rows = [[row.parameters.get(name, values[name][row.after]) for name in values] for row in events]
-    table = np.array(rows, dtype=float).reshape(len(events), len(values))
-    return variables | {"event_parameters": (("event", "parameter"), table)}
 
 
 def _points(name: str, values: ArrayLike, count: int | None, kind: type = float, dimensions: int = 1) -> np.ndarray:
@@ -263,18 +256,13 @@ def branch_dataset(branch: Any) -> xarray.Dataset:
             for name, value in {**branch.options, "warnings": "\n".join(branch.warnings)}.items()
         },
     )
-    return _with_tracked(dataset, branch, rows)
-
-
-def _with_tracked(dataset: xarray.Dataset, branch: Any, rows: Sequence[EventRow]) -> xarray.Dataset:
-    """The dataset with what only curves of bifurcations have."""
     kind = getattr(branch, "kind", None)
     if kind is None:
         return dataset
     meaning = {"long_name": "coefficient of the normal form: a of limit points, c3 of period doublings, else nan"}
-    dataset = dataset.assign_attrs(tracked=str(kind), plane="\n".join(getattr(branch, "plane", ())))
+    dataset = dataset.assign_attrs(tracked=str(kind), plane="\n".join(branch.plane))
     return dataset.assign(
-        coefficient=("point", np.asarray(getattr(branch, "coefficient", np.empty(0)), dtype=float), meaning),
+        coefficient=("point", np.asarray(branch.coefficient, dtype=float), meaning),
         event_extreme=("event", np.array([row.extreme for row in rows], dtype=object)),
     )
 
@@ -299,7 +287,8 @@ def _event_rows(branch: Any, arclength: np.ndarray) -> list[EventRow]:
             given |= {"contact": str(event.contact), "contact_at": event.contact.parameter}
         given |= {"multiplier": event.critical_multiplier(), "multiplier_error": event.critical_error}
         given |= {"stable_after": _stable_after(branch, event, after, before, id(event) in own)}
-        rows.append(EventRow(after=after, parameters=dict(event.parameters), extreme=_extreme(event), **given))
+        extreme = f"{event.extreme} of {event.parameter_name}" if getattr(event, "extreme", "") else ""
+        rows.append(EventRow(after=after, parameters=dict(event.parameters), extreme=extreme, **given))
     return rows
 
 
@@ -307,19 +296,15 @@ def _stable_after(branch: Any, event: Any, after: int, before: bool, own: bool) 
     """Whether the motions right after an event are stable; of a curve of bifurcations, all but its critical ones."""
     if getattr(event, "curve", ""):
         return bool(branch.stable[min(after + 1, len(branch.stable) - 1)]) if event.kind in _BY_ANOTHER else before
-    return before if own else not before and not _others_unstable(event.multipliers, event.critical_multiplier())
-
-
-def _extreme(event: Any) -> str:
-    which = getattr(event, "extreme", "")
-    return f"{which} of {getattr(event, 'parameter_name', '')}" if which else ""
-
-
-def _others_unstable(multipliers: np.ndarray, critical: complex) -> bool:
-    """Whether multipliers other than the critical one (and its conjugate) lie outside the unit circle."""
+    if own:
+        return before
+    if before:
+        return False
+    # unless multipliers other than the critical one (and its conjugate) lie outside the unit circle
+    multipliers, critical = event.multipliers, event.critical_multiplier()
     distance = np.minimum(np.abs(multipliers - critical), np.abs(multipliers - np.conj(critical)))
     skip = np.argsort(distance)[: 1 if abs(critical.imag) < 1e-6 * abs(critical) else 2]
-    return bool(np.any(np.abs(np.delete(multipliers, skip)) > 1.0))
+    return not np.any(np.abs(np.delete(multipliers, skip)) > 1.0)
 
 
 # ----------------------------------------------------------------------------------------------------- quantities
