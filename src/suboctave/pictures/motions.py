@@ -42,7 +42,7 @@ _COLUMNS = 4
 #: inches of width of a frame below which labels are cut short, and of a figure above which most columns have room
 _NARROW, _WIDE = 1.9, 5.0
 #: inches of a caption
-_CAPTION = 0.26
+_CAPTION = 0.13
 
 
 @with_options(MotionOptions)
