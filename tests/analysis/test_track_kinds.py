@@ -15,8 +15,7 @@ from suboctave.analysis.options import settings_of
 from suboctave.continuation import NewtonOptions, SteppingOptions
 from suboctave.continuation.march import March
 from suboctave.continuation.place import Place
-from suboctave.curves.tracked.start import Box, solved_start
-from suboctave.harmonic.evaluation import HarmonicBalance
+from suboctave.curves.tracked.start import solved_start
 from suboctave.timedomain import locate_by_shooting, state_transition
 
 
@@ -151,17 +150,16 @@ def test_an_instant_is_compared_on_the_circle(turns):
     response = so.frequency_response(so.library.reference_oscillator(p=0.55), (4.5, 1.3), 9)
     touch = so.switch_branch(response.bifurcations["PD"][0]).grazings[0]
     system, newton = touch.orbit.system, NewtonOptions()
-    box = Box(None, (0.3, 0.8), None)
+    bounds = (0.3, 0.8)
     settings = settings_of(system, {"observe": 0})
-    balance = HarmonicBalance(system, touch.orbit.basis)
-    start = solved_start(touch, balance, None, ("omega", "p"), box, settings)
-    before, here, behind = islice(March(start, 1.0, box.second, newton, SteppingOptions()), 2, 5)
+    start = solved_start(touch, touch.orbit.basis, None, ("omega", "p"), {"p": bounds}, settings)
+    before, here, behind = islice(March(start, 1.0, bounds, newton, SteppingOptions()), 2, 5)
 
     def later(point):
         curve, weights = here.curve, here.weights
         u = curve.images(point.u)[1]
         along = curve.images(point.u + point.tangent)[1] - u
-        u[balance.dimension] += turns * 2.0 * math.pi
+        u[curve.balance.dimension] += turns * 2.0 * math.pi
         return replace(point, u=u, tangent=along, weights=weights)
 
     passed = Place(here).passed(later(before), later(behind))

@@ -35,7 +35,7 @@ def doublings():
 def located(kind, basis):
     """The event of a kind on the curve in a basis: its point."""
     item = next(e for e in doublings().bifurcations if e.kind == kind and e.parameter("j") > 0.16)
-    start, u = curve_through(item, item.orbit.balance, None, ("omega", "j"), (3.0, 1.0))
+    start, u = curve_through(item, item.orbit.basis, ("omega", "j"), {"omega": (0.0, 3.0), "j": (0.0, 1.0)})
     curve = start.with_basis(basis)
     near = curve.transfer(u, start)
     point = nearest_point(curve, near, curve.weights(near, 0.0), OPTIONS)

@@ -21,22 +21,14 @@ from suboctave.continuation import NewtonOptions
 from suboctave.continuation.linear import length, one_thread
 from suboctave.continuation.newton import correct
 from suboctave.continuation.problem import Array
-from suboctave.curves.discretisation import own_linear_part
 from suboctave.curves.events.formulation import Alcorta2019, BorderedSystem, Formulation, formulation_of
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.sample import Sample
 from suboctave.curves.tracked.events import LocatedEvent, as_event
 from suboctave.curves.tracked.nearest import nearest_point
-from suboctave.curves.tracked.start import (
-    curve_through,
-    discretisation,
-    is_extremum,
-    spans_of,
-    with_extremum,
-)
+from suboctave.curves.tracked.start import curve_through, is_extremum, with_extremum
 from suboctave.curves.tracked.tests import Extremum
 from suboctave.errors import InputError, shortened
-from suboctave.harmonic.evaluation import HarmonicBalance
 from suboctave.interruption import limited
 
 #: step of the differences along Psi, in units of the motion and of the parameters' ranges
@@ -87,14 +79,11 @@ def locate_extremum(
     settings = settings_of(orbit.system, {**kept, "newton": newton})
     names = (extremum.names[0], extremum.names[1])
     with one_thread():
-        _, basis = discretisation(orbit.basis, max(1, orbit.basis.harmonics // orbit.basis.nu))
-        if basis.harmonics < orbit.basis.harmonics:
-            basis = orbit.basis
-        balance = HarmonicBalance(orbit.system, basis, linear=own_linear_part(orbit))
-        curve, u = curve_through(extremum, balance, None, names, spans_of(extremum, names, None))
+        curve, u = curve_through(extremum, orbit.basis, names)
         options = replace(settings.newton, iterations=max(_ITERATIONS, settings.newton.iterations))
         u = newton_extremum(curve, u, extremum.parameter_name, options, chosen)
-        located = LocatedEvent(Extremum(extremum.parameter_name), _sample(curve, u, options), extremum.extreme)
+        sample = Sample(nearest_point(curve, u, curve.weights(u, 0.0), options))
+        located = LocatedEvent(Extremum(extremum.parameter_name), sample, extremum.extreme)
         event = as_event(located, settings.stability, settings.observe)
     return replace(event, arclength=extremum.arclength, context=extremum.context)
 
@@ -156,7 +145,3 @@ class _Published:
         jacobian[-1, n:] = 2.0 * psi
         error = max(here.error, length(turned) / float(np.abs(m).max()))
         return _PublishedEvaluation(np.concatenate((here.residual, turned, [psi @ psi - 1.0])), jacobian, error)
-
-
-def _sample(curve: MotionProblem, u: Array, newton: NewtonOptions) -> Sample:
-    return Sample(nearest_point(curve, u, curve.weights(u, 0.0), newton))

@@ -31,6 +31,7 @@ from suboctave.curves.junction import period_name
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.sample import Sample
 from suboctave.curves.starts import linear_response, start_point
+from suboctave.curves.subharmonic_part import subharmonic_share
 from suboctave.curves.trace import Trace
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.basis import HarmonicBasis
@@ -259,7 +260,7 @@ def _motions(curve: MotionProblem, seeds: Seeds, run: CurveRun, report: Report) 
                 continue
             x = curve.split(solved.u)[0]
             start = PeriodicOrbit(curve.balance, x, float(value), curve.balance.values, 0.0, 0.0, curve.adaptive)
-            if not _lasts(curve, solved.u) or any(relation(start, other).one for other in met):
+            if subharmonic_share(curve, solved.u) <= _SUBHARMONIC or any(relation(start, other).one for other in met):
                 continue
             met.append(start)
             try:
@@ -268,7 +269,7 @@ def _motions(curve: MotionProblem, seeds: Seeds, run: CurveRun, report: Report) 
                 continue
             own = point.curve
             assert isinstance(own, MotionProblem)
-            if _lasts(own, point.u) and own.balance.basis.nu == nu:
+            if own.balance.basis.nu == nu and subharmonic_share(own, point.u) > _SUBHARMONIC:
                 yield point
 
 
@@ -341,18 +342,3 @@ def _free(pull: Callable[[Array], tuple[Array, Array]], start: Array) -> Array:
         if length(step) <= 1e-6 * length(a):
             return a if length(a) >= 0.1 * length(start) else start
     return start
-
-
-def _lasts(curve: MotionProblem, u: Array) -> bool:
-    """Whether a motion has the period of its basis: for every prime factor something that a shorter one lacks."""
-    basis = curve.balance.basis
-    x = curve.split(u)[0] * curve.balance.scales()[0]
-    whole = length(x)
-    k = np.arange(1, basis.harmonics + 1)
-    primes = [p for p in range(2, basis.nu + 1) if basis.nu % p == 0 and all(p % q for q in range(2, p))]
-    for factor in primes:
-        rows = k[k % factor != 0]
-        part = np.hypot(length(x[2 * rows - 1]), length(x[2 * rows]))
-        if part <= _SUBHARMONIC * whole:
-            return False
-    return True

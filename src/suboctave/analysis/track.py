@@ -33,7 +33,7 @@ from suboctave.continuation import CurvePoint, NewtonOptions, SteppingOptions
 from suboctave.continuation.linear import length, one_thread
 from suboctave.continuation.newton import correct
 from suboctave.continuation.point import make_point
-from suboctave.curves.discretisation import check_unknowns, harmonics_of, own_linear_part
+from suboctave.curves.discretisation import check_unknowns, harmonics_of
 from suboctave.curves.events.formulation import BorderedSystem
 from suboctave.curves.kinds.singular import SingularOperator
 from suboctave.curves.motion import MotionEvaluation, MotionProblem
@@ -41,10 +41,10 @@ from suboctave.curves.points import BranchPoint
 from suboctave.curves.subharmonic_part import repeats_earlier
 from suboctave.curves.trace import Settings, Trace
 from suboctave.curves.tracked.follow import follow_tracked
-from suboctave.curves.tracked.start import Box, curve_through, discretisation, is_extremum, solved_start, spans_of
+from suboctave.curves.tracked.start import Ranges, curve_through, discretisation, inside, is_extremum, solved_start
 from suboctave.errors import ConvergenceError, InputError, is_number, shortened, suggest
 from suboctave.harmonic.basis import HarmonicBasis
-from suboctave.harmonic.evaluation import BalanceState, HarmonicBalance
+from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.perturbation import Kind
 from suboctave.harmonic.truncation import AdaptiveHarmonics
@@ -119,28 +119,23 @@ def track(
     """
     item, through = begun(bifurcation, onto, options.get("observe"))
     turning = item.parameter_name if is_extremum(item) else ""
-    if is_extremum(item):
-        names, (first, second), between = _third(item, parameter, bounds, omega)
-    else:
-        (names, (first, second)), between = _free(item, parameter, bounds, omega), None
+    names, given = (_third if is_extremum(item) else _free)(item, parameter, bounds, omega)
+    ranges = {name: (min(ends), max(ends)) for name, ends in given.items()}
     kind = curve_onto(item, through)
     settings = _settings(item, turning, options)
     wanted, adaptive, basis = _harmonics(item, harmonics)
-    assert second is not None
-    box = Box(None if first is None else (min(first), max(first)), (min(second), max(second)), between)
     with one_thread(), reporting(options.get("progress"), f"{kind} over {names[-1]}") as report:
-        settings = settings.reporting_to(report, box.second, "event")
+        settings = settings.reporting_to(report, ranges[names[-1]], "event")
         if item.kind in CURVES_THROUGH:
             assert isinstance(item, TrackedEvent)
-            item = start_onto(item, kind, names, box, settings.newton)
+            item = start_onto(item, kind, names, ranges, settings.newton)
             wanted, adaptive, basis = _harmonics(item, harmonics)
-        balance = HarmonicBalance(item.orbit.system, basis, linear=own_linear_part(item.orbit))
-        start = solved_start(item, balance, adaptive, names, box, settings)
+        start = solved_start(item, basis, adaptive, names, ranges, settings)
         if item.kind in CURVES_THROUGH:
-            start = aside(start, box, settings.newton)
-        trace = _both_ways(start, box, math.copysign(1.0, second[1] - second[0]), settings)
-    ranges_by_name = ((names[0], first), (names[1], between), (names[-1], second))
-    kept = options_of(settings, wanted, {name: given for name, given in ranges_by_name if given is not None})
+            start = aside(start, ranges, settings.newton)
+        first, last = given[names[-1]]
+        trace = _both_ways(start, ranges, math.copysign(1.0, last - first), settings)
+    kept = options_of(settings, wanted, given)
     return _branch(item, names, turning, trace, settings, kept)
 
 
@@ -193,11 +188,9 @@ def _branch(
     )
 
 
-def _third(
-    item: TrackedEvent, parameter: Any, bounds: Any, omega: Any
-) -> tuple[tuple[str, ...], tuple[Range | None, Range | None], Range | None]:
-    """The three parameters in which an extremum is followed, the ranges of the first and the last, checked, and that of
-    the one between: named ones of the extremum's curve keep theirs.
+def _third(item: TrackedEvent, parameter: Any, bounds: Any, omega: Any) -> tuple[tuple[str, ...], dict[str, Range]]:
+    """The three parameters in which an extremum is followed and the ranges that they have, checked: named ones of the
+    extremum's curve keep theirs.
     """
     system = item.orbit.system
     if len(item.names) != 2:
@@ -212,12 +205,12 @@ def _third(
         raise InputError(f"{parameter} is free on the curve of this extremum already: name a third parameter")
     if omega is not None and item.names[0] != "omega":
         raise InputError("omega= bounds omega where it is free, which it is not on the curve of this extremum")
-    first, between = (_kept(item, name) for name in item.names)
+    ranges = {name: kept for name in item.names if (kept := _kept(item, name)) is not None}
     if omega is not None:
-        first = check_range("omega", omega, positive=True)
-    ranges = (first, check_bounds(system, parameter, bounds))
-    _check_inside(item, (item.names[0], parameter), ranges)
-    return (*item.names, parameter), ranges, between
+        ranges = {"omega": check_range("omega", omega, positive=True), **ranges}
+    ranges[parameter] = check_bounds(system, parameter, bounds)
+    _check_inside(item, {name: ranges[name] for name in (item.names[0], parameter) if name in ranges})
+    return (*item.names, parameter), ranges
 
 
 def _kept(item: TrackedEvent, name: str) -> Range | None:
@@ -233,10 +226,8 @@ def _kept(item: TrackedEvent, name: str) -> Range | None:
     return low - more, high + more
 
 
-def _free(
-    item: Bifurcation, parameter: Any, bounds: Any, omega: Any
-) -> tuple[tuple[str, ...], tuple[Range | None, Range | None]]:
-    """The two free parameters and their ranges, checked."""
+def _free(item: Bifurcation, parameter: Any, bounds: Any, omega: Any) -> tuple[tuple[str, ...], dict[str, Range]]:
+    """The two free parameters and the ranges that they have, checked."""
     if not isinstance(item, Bifurcation):
         raise InputError(
             f"track starts from a located bifurcation, not {type(item).__name__}: one of the .bifurcations of a branch"
@@ -248,17 +239,17 @@ def _free(
         )
     system = item.orbit.system
     if isinstance(parameter, str):
-        names: tuple[str, str] = ("omega", parameter)
+        names: tuple[str, ...] = ("omega", parameter)
         if parameter == "omega":
             raise InputError("omega is free already: parameter= names the second one, omega=(from, to) bounds omega")
         check_parameter(system, parameter)
-        second = check_bounds(system, parameter, bounds)
-        first = None if omega is None else check_range("omega", omega, positive=True)
+        ranges = {} if omega is None else {"omega": check_range("omega", omega, positive=True)}
+        ranges[parameter] = check_bounds(system, parameter, bounds)
     else:
         both = tuple(parameter) if isinstance(parameter, Sequence) else ()
         if len(both) != 2 or not all(isinstance(name, str) for name in both) or both[0] == both[1]:
             raise InputError(f"parameter must be a name or two different names, not {parameter!r}")
-        names = (both[0], both[1])
+        names = both
         for name in names:
             check_parameter(system, name)
         if names[1] == "omega":
@@ -267,16 +258,14 @@ def _free(
             raise InputError("with two parameters named their ranges are in bounds: leave omega= out")
         if not isinstance(bounds, Sequence) or len(bounds) != 2 or any(is_number(b) for b in bounds):
             raise InputError(f"bounds of two parameters are two ranges, ((from, to), (from, to)), not {bounds!r}")
-        first, second = (check_bounds(system, name, r) for name, r in zip(names, bounds, strict=True))
-    _check_inside(item, names, (first, second))
-    return names, (first, second)
+        ranges = {name: check_bounds(system, name, r) for name, r in zip(names, bounds, strict=True)}
+    _check_inside(item, ranges)
+    return names, ranges
 
 
-def _check_inside(item: Bifurcation, names: tuple[str, str], ranges: tuple[Range | None, Range | None]) -> None:
+def _check_inside(item: Bifurcation, ranges: Ranges) -> None:
     """Refuse a bifurcation outside the ranges."""
-    for name, ends in zip(names, ranges, strict=True):
-        if ends is None:
-            continue
+    for name, ends in ranges.items():
         value, (low, high) = item.parameter(name), sorted(ends)
         slack = 1e-9 * (high - low)
         if not low - slack <= value <= high + slack:
@@ -292,27 +281,26 @@ def _harmonics(item: Bifurcation, given: Any) -> tuple[Any, AdaptiveHarmonics | 
     return wanted, adaptive, basis
 
 
-def _both_ways(start: CurvePoint, box: Box, ahead: float, settings: Settings) -> Trace:
+def _both_ways(start: CurvePoint, ranges: Ranges, ahead: float, settings: Settings) -> Trace:
     """Follow a curve from a start to both sides; from a bound inwards only."""
     if start.tangent[-1] * ahead < 0.0:
         start = replace(start, tangent=-start.tangent, orientation=-start.orientation)
     turned = replace(start, tangent=-start.tangent, orientation=-start.orientation)
-    ways = [_leads_inside(point, box) for point in (start, turned)]
+    ways = [_leads_inside(point, ranges) for point in (start, turned)]
     if not any(ways):
         raise InputError("the curve leaves the ranges at its start in both directions: widen them")
-    forward = follow_tracked(start, box, settings) if ways[0] else None
+    forward = follow_tracked(start, ranges, settings) if ways[0] else None
     if forward is not None and (forward.closed or forward.interrupted or not ways[1]):
         return forward
-    back = follow_tracked(turned, box, settings)
+    back = follow_tracked(turned, ranges, settings)
     # closed the other way it is the whole curve, wherever this way came to an end
     return back if forward is None or back.closed else back.reversed_before(forward)
 
 
-def _leads_inside(point: CurvePoint, box: Box) -> bool:
+def _leads_inside(point: CurvePoint, ranges: Ranges) -> bool:
     """Whether a curve that begins at a point stays within its ranges there."""
     assert isinstance(point.curve, MotionProblem)
-    names = point.curve.names
-    for name, (low, high) in box.ranges(names).items():
+    for name, (low, high) in ranges.items():
         index = point.curve.index(name)
         value, slope = point.u[index], point.tangent[index]
         slack = 1e-9 * (high - low)
@@ -397,23 +385,19 @@ def curve_onto(item: Bifurcation, onto: str | None) -> str:
 
 
 def start_onto(
-    item: TrackedEvent,
-    kind: str,
-    names: tuple[str, ...],
-    box: Box,
-    newton: NewtonOptions,
+    item: TrackedEvent, kind: str, names: tuple[str, ...], ranges: Ranges, newton: NewtonOptions
 ) -> Bifurcation:
     """A bifurcation of a kind at a point of codimension two, or beside it where its curve begins there; InputError if
     the curve lies outside the ranges, ConvergenceError where nothing of that kind is found.
     """
     if item.kind == "GPD" and kind == "LP":
-        return _beside_doubling(item, names, box, newton)
+        return _beside_doubling(item, names, ranges, newton)
     if kind == "LP" and _symmetric(item, names):
         kind = "BP"
     if kind != "NS":
         return replace(item, curve=kind, kappa=0.0)
     if item.kind in ("R1", "R2"):
-        return _beside_resonance(item, names, box, newton)
+        return _beside_resonance(item, names, ranges, newton)
     return replace(item, curve=kind, kappa=_frequency(item))
 
 
@@ -427,7 +411,7 @@ def _symmetric(item: TrackedEvent, names: tuple[str, ...]) -> bool:
     return all(transversality(state, vectors, name) <= _FORCED for name in names)
 
 
-def aside(start: CurvePoint, box: Box, newton: NewtonOptions) -> CurvePoint:
+def aside(start: CurvePoint, ranges: Ranges, newton: NewtonOptions) -> CurvePoint:
     """A start a little beside a point of codimension two, which the curve then passes; the start where none is found.
 
     Tests vanish at the point itself, and do not tell there that they change sign.
@@ -440,7 +424,7 @@ def aside(start: CurvePoint, box: Box, newton: NewtonOptions) -> CurvePoint:
             continue
         point = make_point(solved, start.curve, start.tangent, 0.0)
         assert isinstance(point.curve, MotionProblem)
-        if box.around(point.curve.names, point.curve.named(point.u)):
+        if inside(point.curve.named(point.u), ranges):
             return point
     return start
 
@@ -463,17 +447,16 @@ def _frequency(item: TrackedEvent) -> float:
     return float(np.angle(pair)) / item.orbit.period
 
 
-def _beside_resonance(item: TrackedEvent, names: tuple[str, ...], box: Box, newton: NewtonOptions) -> Bifurcation:
+def _beside_resonance(item: TrackedEvent, names: tuple[str, ...], ranges: Ranges, newton: NewtonOptions) -> Bifurcation:
     """A Neimark-Sacker point close to a 1:1 or 1:2 resonance."""
     orbit = item.orbit
     rate = orbit.omega / orbit.basis.nu
-    balance = HarmonicBalance(orbit.system, orbit.basis, linear=own_linear_part(orbit))
     outside, reason = False, "they lie elsewhere, or more harmonics are needed"
     for share in _SHARES:
         kappa = (share if item.kind == "R1" else 0.5 - share) * rate
         beside = replace(item, curve="NS", kappa=kappa)
         try:
-            curve, u = curve_through(beside, balance, None, names, spans_of(item, names, box))
+            curve, u = curve_through(beside, orbit.basis, names, ranges)
             weights = curve.weights(u, 0.0)
             solved = correct(curve, u, curve.balance.dimension, weights, newton)
         except ConvergenceError as failure:
@@ -483,7 +466,7 @@ def _beside_resonance(item: TrackedEvent, names: tuple[str, ...], box: Box, newt
         assert isinstance(evaluation, MotionEvaluation)
         if length(weights * (solved.u - u)) > _NEAR or evaluation.doubt > _CRITICAL:
             continue
-        if box.around(names, curve.named(solved.u)):
+        if inside(curve.named(solved.u), ranges):
             return replace(beside, orbit=_moved(orbit, evaluation.state))
         outside = True
     at = " and ".join(f"{name} = {item.parameter(name):.6g}" for name in item.names)
@@ -494,11 +477,10 @@ def _beside_resonance(item: TrackedEvent, names: tuple[str, ...], box: Box, newt
     raise ConvergenceError(f"no Neimark-Sacker points were found beside the {item.kind} at {at}: {reason}")
 
 
-def _beside_doubling(item: TrackedEvent, names: tuple[str, ...], box: Box, newton: NewtonOptions) -> Bifurcation:
+def _beside_doubling(item: TrackedEvent, names: tuple[str, ...], ranges: Ranges, newton: NewtonOptions) -> Bifurcation:
     """A limit point of the doubled motions close to a GPD."""
     orbit = item.orbit
-    balance = HarmonicBalance(orbit.system, orbit.basis.doubled, linear=own_linear_part(orbit))
-    curve, u = curve_through(replace(item, curve="LP"), balance, None, names, spans_of(item, names, box))
+    curve, u = curve_through(replace(item, curve="LP"), orbit.basis.doubled, names, ranges)
     weights, operator = curve.weights(u, 0.0), curve.augmentation
     assert isinstance(operator, SingularOperator)
     away = curve.join(operator.borders.right * curve.balance.row_weights(curve.balance.dimension), 0.0)
@@ -513,7 +495,7 @@ def _beside_doubling(item: TrackedEvent, names: tuple[str, ...], box: Box, newto
                 break
             evaluation = solved.evaluation
             assert isinstance(evaluation, MotionEvaluation)
-            if evaluation.doubt > _CRITICAL or not box.around(names, curve.named(solved.u)):
+            if evaluation.doubt > _CRITICAL or not inside(curve.named(solved.u), ranges):
                 break
             beside = replace(item, curve="LP", orbit=_moved(orbit, evaluation.state))
             bend, size = (solved.u - u - size * away) / size**2, 2.0 * size

@@ -24,17 +24,15 @@ def keeps_subharmonics(a: CurvePoint, b: CurvePoint) -> bool:
     """False if the sub-harmonic part of a motion may have vanished between two neighbours."""
     curve = b.curve
     assert isinstance(curve, MotionProblem)
-    if curve.balance.basis.nu == 1 or subharmonic_share(b) <= NOTHING_LEFT:
+    if curve.balance.basis.nu == 1 or subharmonic_share(curve, b.u) <= NOTHING_LEFT:
         return True
     before = parts_of(curve, curve.transfer(a.u, a.curve))
     return all(float(p @ q) >= 0.25 * float(p @ p) for p, q in zip(before, parts_of(curve, b.u), strict=True))
 
 
-def subharmonic_share(point: CurvePoint) -> float:
+def subharmonic_share(curve: MotionProblem, u: Array) -> float:
     """Smallest share of a motion that one of its period multiplications has brought about."""
-    curve = point.curve
-    assert isinstance(curve, MotionProblem)
-    return min(float(np.linalg.norm(part)) for part in parts_of(curve, point.u)) / (curve.size(point.u) or 1.0)
+    return min(float(np.linalg.norm(part)) for part in parts_of(curve, u)) / (curve.size(u) or 1.0)
 
 
 def parts_of(curve: MotionProblem, u: Array) -> list[Array]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from itertools import groupby
 
 import numpy as np
 
@@ -270,15 +271,9 @@ def _within(stretch: Unsettled, known: Unsettled) -> bool:
 
 def _runs(places: Sequence[int]) -> Iterator[tuple[int, int]]:
     """First and last of each run of consecutive numbers."""
-    first = last = None
-    for place in places:
-        if last is None or place > last + 1:
-            if first is not None and last is not None:
-                yield first, last
-            first = place
-        last = place
-    if first is not None and last is not None:
-        yield first, last
+    for _, run in groupby(enumerate(places), lambda pair: pair[1] - pair[0]):
+        first, *rest = (place for _, place in run)
+        yield first, rest[-1] if rest else first
 
 
 def _value(point: BranchPoint, name: str) -> float:

@@ -100,7 +100,7 @@ def end_between(a: Sample, b: Sample, newton: NewtonOptions, lopsided: bool = Tr
         return _resonance(a, target == 0.5, newton)
     if b.curve.balance.basis.nu == 1:
         return _symmetry_gained(a, b) if lopsided else None
-    share = subharmonic_share(b.point)
+    share = subharmonic_share(b.curve, b.point.u)
     if share <= _FAINT:
         parent = _on_the_parent(a, newton)
         if parent is not None:
@@ -154,7 +154,7 @@ def end_ahead(a: Sample, b: Sample, newton: NewtonOptions) -> End | None:
     nothing; so the end is looked for while they still do, and taken if it lies where the last two points lead.
     """
     lead = _lead(a, b)
-    if lead is None or subharmonic_share(b.point) <= NOTHING_LEFT:
+    if lead is None or subharmonic_share(b.curve, b.point.u) <= NOTHING_LEFT:
         return None
     before, size = (doubled_size(sample.curve, sample.point.u) for sample in (a, b))
     if size > _AHEAD * (before - size):

@@ -22,7 +22,7 @@ from suboctave.curves.trace import Settings, Trace
 from suboctave.curves.tracked.corners import beyond_corner
 from suboctave.curves.tracked.ends import End, comes_close, end_ahead, end_between, is_lopsided, points_before, rebased
 from suboctave.curves.tracked.events import LocatedEvent, as_event, events_between, extreme_of, refined
-from suboctave.curves.tracked.start import Box
+from suboctave.curves.tracked.start import Ranges
 from suboctave.curves.tracked.steps import StepWatch
 from suboctave.curves.tracked.tests import Extremum, tests_of
 from suboctave.errors import ConvergenceError
@@ -40,23 +40,23 @@ _CORNER = 1e-5
 _DOUBTFUL, _UNTOLD, _VIOLENT = 0.05, 3, 1e4
 
 
-def follow_tracked(start: CurvePoint, box: Box, settings: Settings) -> Trace:
+def follow_tracked(start: CurvePoint, ranges: Ranges, settings: Settings) -> Trace:
     """Follow a curve from a solved start along the start's own tangent; KeyboardInterrupt ends it politely."""
-    return _Tracker(start, box, settings).run()
+    return _Tracker(start, ranges, settings).run()
 
 
 class _Tracker(Driver):
-    def __init__(self, start: CurvePoint, box: Box, settings: Settings) -> None:
+    def __init__(self, start: CurvePoint, ranges: Ranges, settings: Settings) -> None:
         assert isinstance(start.curve, MotionProblem)
         super().__init__(settings)
         self.lopsided = is_lopsided(Sample(start))
         #: the first point, headed as the curve leaves it
         self.home: CurvePoint | None = None
-        self.box = box
+        self.bounds = ranges[start.curve.name]
         #: ranges of the parameters but the last
         self.others = [
             Bounds(partial(MotionProblem.index, name=name), *ends)
-            for name, ends in box.ranges(start.curve.names).items()
+            for name, ends in ranges.items()
             if name != start.curve.name
         ]
         self.march = self._marching(start)
@@ -72,7 +72,7 @@ class _Tracker(Driver):
     def _marching(self, start: CurvePoint) -> March:
         """Along the tangent of a point; closed where it comes back to the first one."""
         options = (self.settings.newton, self.settings.stepping, self._clear)
-        return March(start, 0.0, self.box.second, *options, home=self.home, others=self.others)
+        return March(start, 0.0, self.bounds, *options, home=self.home, others=self.others)
 
     def _walk(self) -> None:
         trace = self.trace

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, TypeGuard
 
 import numpy as np
@@ -15,7 +15,7 @@ from suboctave.continuation.linear import length
 from suboctave.continuation.newton import correct, tangent
 from suboctave.continuation.point import make_point
 from suboctave.curves.augmentation import Augmentation
-from suboctave.curves.discretisation import rule_of
+from suboctave.curves.discretisation import own_linear_part, rule_of
 from suboctave.curves.events.formulation import BORDERED, Formulation
 from suboctave.curves.kinds.extremum import LimitPointExtremal
 from suboctave.curves.kinds.extremum_bordered import BorderedExtremal
@@ -29,29 +29,17 @@ from suboctave.harmonic.evaluation import HarmonicBalance
 from suboctave.harmonic.truncation import AdaptiveHarmonics
 from suboctave.kinds import KINDS, MOTION_KINDS
 
+#: ranges of free parameters that are bounded, (low, high), by their names
+Ranges = Mapping[str, tuple[float, float]]
+
 #: a start moves at most this far from the located point, or the motion given, in units of the parameters' spans and of
 #: the motion
 _NEAR, _BESIDE = 0.05, 0.5
 
 
-@dataclass(frozen=True)
-class Box:
-    """Ranges of the first and the last free parameter, and of that between along a curve of extrema; None where one is
-    not bounded. The curve ends on them.
-    """
-
-    first: tuple[float, float] | None
-    second: tuple[float, float]
-    between: tuple[float, float] | None = None
-
-    def ranges(self, names: Sequence[str]) -> dict[str, tuple[float, float]]:
-        """Those of the free parameters that are bounded, by their names, the last one last."""
-        known = {names[0]: self.first, names[1]: self.between, names[-1]: self.second}
-        return {name: ends for name, ends in known.items() if ends is not None}
-
-    def around(self, names: Sequence[str], values: Mapping[str, float]) -> bool:
-        """Whether values of the free parameters lie within the ranges."""
-        return all(low <= values[name] <= high for name, (low, high) in self.ranges(names).items())
+def inside(values: Mapping[str, float], ranges: Ranges) -> bool:
+    """Whether values of free parameters lie within the ranges of those that are bounded."""
+    return all(low <= values[name] <= high for name, (low, high) in ranges.items())
 
 
 def is_extremum(item: Any) -> TypeGuard[TrackedEvent]:
@@ -67,34 +55,31 @@ def discretisation(basis: HarmonicBasis, wanted: Any) -> tuple[AdaptiveHarmonics
     return None, HarmonicBasis(rule * basis.nu, basis.nu)
 
 
-def spans_of(item: Bifurcation, names: tuple[str, ...], box: Box | None) -> tuple[float, ...]:
-    """Sizes of the free parameters: widths of their ranges, where there are none their values."""
-    ranges = dict((item.context or {}).get("bounds", {})) if is_extremum(item) else {}
-    if box is not None:
-        ranges |= box.ranges(names)
-    sizes = [abs(float(ranges[n][1]) - float(ranges[n][0])) if n in ranges else abs(item.parameter(n)) for n in names]
-    return tuple(size or 1.0 for size in sizes)
-
-
 def curve_through(
     item: Bifurcation,
-    balance: HarmonicBalance,
-    adaptive: AdaptiveHarmonics | None,
+    basis: HarmonicBasis,
     names: tuple[str, ...],
-    spans: tuple[float, ...],
+    ranges: Ranges | None = None,
+    adaptive: AdaptiveHarmonics | None = None,
     formulation: Formulation = BORDERED,
 ) -> tuple[MotionProblem, np.ndarray]:
-    """The curve of bifurcations in free parameters through one of them, and its u there, in the basis of `balance`."""
+    """The curve of bifurcations in free parameters through one of them, and its u there, in a basis.
+
+    Parameters have the size of their ranges, where there are none that of their values.
+    """
     orbit = item.orbit
-    x = orbit.basis.resized(orbit.coefficients, balance.basis)
-    balance = balance.settle(x, orbit.omega)
+    widths = {**(item.context or {}).get("bounds", {})} if is_extremum(item) else {}
+    widths |= ranges or {}
+    spans = [abs(float(widths[n][1]) - float(widths[n][0])) if n in widths else abs(item.parameter(n)) for n in names]
+    x = orbit.basis.resized(orbit.coefficients, basis)
+    balance = HarmonicBalance(orbit.system, basis, linear=own_linear_part(orbit)).settle(x, orbit.omega)
     state = balance.at(x, orbit.omega)
     augmentation, extra = formulation.equations(kind_of(item)).through(item, state, names)
     force = state.balanced.scale
     curve = MotionProblem(
         balance,
         names,
-        spans,
+        tuple(span or 1.0 for span in spans),
         orbit.omega,
         adaptive,
         # between what a response curve needs and what a located event does
@@ -126,10 +111,10 @@ def with_extremum(curve: MotionProblem, u: np.ndarray, turning: str, plane: tupl
 
 def solved_start(
     item: Bifurcation,
-    balance: HarmonicBalance,
+    basis: HarmonicBasis,
     adaptive: AdaptiveHarmonics | None,
     names: tuple[str, ...],
-    box: Box,
+    ranges: Ranges,
     settings: Settings,
 ) -> CurvePoint:
     """The bifurcation solved again as a point of the curve, in a basis that suits it.
@@ -139,8 +124,8 @@ def solved_start(
     ConvergenceError
         If it is not found again.
     """
-    curve, u = curve_through(item, balance, adaptive, names, spans_of(item, names, box), settings.formulation)
-    for name, (low, high) in box.ranges(names).items():
+    curve, u = curve_through(item, basis, names, ranges, adaptive, settings.formulation)
+    for name, (low, high) in ranges.items():
         u[curve.index(name)] = min(high, max(low, u[curve.index(name)]))
     if is_extremum(item):
         curve = with_extremum(curve, u, item.parameter_name, (names[0], names[1]))
