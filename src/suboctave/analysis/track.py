@@ -32,7 +32,7 @@ from suboctave.bifurcation.bordered import null_vectors, transversality
 from suboctave.continuation import CurvePoint, NewtonOptions, SteppingOptions
 from suboctave.continuation.linear import length, one_thread
 from suboctave.continuation.newton import correct
-from suboctave.continuation.point import make_point
+from suboctave.continuation.point import point_ahead
 from suboctave.curves.discretisation import check_unknowns, harmonics_of
 from suboctave.curves.events.formulation import BorderedSystem
 from suboctave.curves.kinds.singular import SingularOperator
@@ -417,12 +417,10 @@ def aside(start: CurvePoint, ranges: Ranges, newton: NewtonOptions) -> CurvePoin
     Tests vanish at the point itself, and do not tell there that they change sign.
     """
     for way in (_ASIDE, -_ASIDE):
-        row = start.weights * start.tangent
         try:
-            solved = correct(start.curve, start.u + way * start.tangent, row / length(row), start.weights, newton)
+            point = replace(point_ahead(start, way, newton), arclength=0.0)
         except ConvergenceError:
             continue
-        point = make_point(solved, start.curve, start.tangent, 0.0)
         assert isinstance(point.curve, MotionProblem)
         if inside(point.curve.named(point.u), ranges):
             return point

@@ -81,6 +81,14 @@ def point_between(
     return make_point(solved, b.curve, chord, a.arclength + fraction * (b.arclength - a.arclength))
 
 
+def point_ahead(point: CurvePoint, way: float, newton: NewtonOptions) -> CurvePoint:
+    """The point of the curve in the plane across the tangent of one, a way along that; may raise ConvergenceError."""
+    curve, weights, along = point.curve, point.weights, point.tangent
+    row = weights * along
+    solved = correct(curve, point.u + way * along, row / length(row), weights, newton)
+    return make_point(solved, curve, along, point.arclength + way)
+
+
 def solved_again(
     point: CurvePoint, curve: Curve, weights: Array, newton: NewtonOptions, spare: float = 0.0
 ) -> CurvePoint:

@@ -73,9 +73,7 @@ def pair_in(stretch: Stretch, newton: NewtonOptions) -> list[tuple[Located, Samp
         basis = _wanted(doublings, curve.adaptive) if doublings else next_harmonics(present, curve.adaptive)
         if basis.harmonics <= present.basis.harmonics:
             break
-        x = present.basis.resized(present.x, basis)
-        balance = curve.with_basis(basis).balance.settle(x, present.omega, present.values)
-        curve = curve.with_balance(balance)
+        curve, _ = curve.finer(present, basis)
         try:
             first, middle, last = (solved_in(curve, s, newton) for s in samples)
         except ConvergenceError:

@@ -312,6 +312,15 @@ class MotionProblem:
         """The same curve in another basis."""
         return self if basis == self.balance.basis else self.with_balance(self._in_basis(basis))
 
+    def finer(self, state: BalanceState, basis: HarmonicBasis) -> tuple[MotionProblem, BalanceState]:
+        """The curve in a basis with more harmonics and a motion there: those that come in begin at what the motion
+        excites, and the samples are as many as it needs.
+        """
+        wide, completed = state.completed_x
+        x = wide.resized(completed, basis)
+        balance = self._in_basis(basis).settle(x, state.omega, state.values)
+        return self.with_balance(balance), balance.at(x, state.omega, state.values)
+
     def transfer(self, u: Array, origin: Curve) -> Array:
         if origin is self:
             return u

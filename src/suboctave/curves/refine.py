@@ -150,10 +150,8 @@ def _with_more_harmonics(located: Located, a: Sample, b: Sample) -> Singular | N
         basis = next_harmonics(state, curve.adaptive)
         if basis.size <= state.basis.size:
             break
-        x = state.basis.resized(state.x, basis)
-        balance = curve.with_basis(basis).balance.settle(x, state.omega, state.values)
-        state = balance.at(x, state.omega, state.values)
-        wide, kind, sample = curve.with_balance(balance), located.kind, located.sample
+        wide, state = curve.finer(state, basis)
+        kind, sample = located.kind, located.sample
         try:
             guess = Guess(state, curve.name, curve.span, kind.kappa(sample))
             solution = kind.solve(guess)
@@ -202,15 +200,12 @@ def _refined(
             basis = next_harmonics(state, adaptive)
         if basis.size <= state.basis.size:
             break
-        wide, completed = state.completed_x
-        x = wide.resized(completed, basis)
-        # more harmonics need more samples of a law that tells nothing of itself
-        balance = curve.with_basis(basis).balance.settle(x, state.omega, state.values)
-        guess = replace(_guess_from(solution, curve, size), state=balance.at(x, state.omega, state.values))
+        wide, start = curve.finer(state, basis)
+        guess = replace(_guess_from(solution, curve, size), state=start)
         try:
             better = solve_or_behind(kind, guess)
             if neighbours is not None:
-                better = _of_its_own(kind, better, curve.with_balance(balance), *neighbours)
+                better = _of_its_own(kind, better, wide, *neighbours)
         except ConvergenceError as failure:
             warnings.append(
                 f"{kind.name} near omega = {state.omega:.6g} was located with {state.basis.harmonics} "

@@ -23,9 +23,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from suboctave.continuation import CurvePoint, NewtonOptions
-from suboctave.continuation.linear import length
-from suboctave.continuation.newton import correct
-from suboctave.continuation.point import make_point
+from suboctave.continuation.point import point_ahead
 from suboctave.continuation.problem import Array
 from suboctave.curves.augmentation import Augmentation
 from suboctave.curves.kinds.branch_point import BranchPointUnfolded
@@ -350,10 +348,8 @@ def points_before(end: End, a: Sample, newton: NewtonOptions) -> list[Sample]:
         if not here * rate < 0.0 or not np.any(first * turned < 0.0):
             break
         way = -0.5 * here / rate
-        row = point.weights * point.tangent
         try:
-            solved = correct(curve, point.u + way * point.tangent, row / length(row), point.weights, newton)
-            b = Sample(make_point(solved, curve, point.tangent, point.arclength + way))
+            b = Sample(point_ahead(point, way, newton))
         except ConvergenceError:
             break
         if not abs(_remaining(curve, b.point.u)) < abs(here) or resonant_between(a, b) is not None:

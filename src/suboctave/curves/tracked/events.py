@@ -154,14 +154,10 @@ def refined(event: LocatedEvent, newton: NewtonOptions, warnings: list[str]) -> 
         curve, basis = sample.curve, _finer(sample)
         if basis is None:
             break
-        finer = curve.with_basis(basis)
-        u = finer.transfer(sample.point.u, curve)
         try:
-            # the harmonics that come in begin at what the motion so far excites
-            fuller, coefficients = sample.state.completed_x
-            u[: finer.balance.dimension] = fuller.resized(coefficients, basis).ravel()
-            x, omega, values = finer.split(u)
-            finer = replace(finer, balance=finer.balance.settle(x, omega, values))
+            finer, state = curve.finer(sample.state, basis)
+            u = finer.transfer(sample.point.u, curve)
+            u[: finer.balance.dimension] = state.unknowns
             along = finer.transfer(sample.point.tangent, curve)
             weights = finer.weights(u, curve.size(sample.point.u))
             start = nearest_point(finer, u, weights, newton, along, BEGINNING)
