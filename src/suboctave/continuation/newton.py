@@ -220,3 +220,9 @@ def tangent(solved: Solved) -> Array:
         raise ConvergenceError("the equations are singular (an undamped resonance, or a body free to move)")
     direction: Array = solved.factor.solve(rhs)
     return direction / (length(direction) * solved.weights)
+
+
+def null_row(curve: Problem, u: Array, weights: Array) -> Array:
+    """Unit vector that the scaled Jacobian at u maps to zero, its last component positive: the curve's direction."""
+    row: Array = np.linalg.qr((curve.evaluate(u).jacobian / weights).T, mode="complete")[0][:, -1]
+    return math.copysign(1.0, row[-1]) * row

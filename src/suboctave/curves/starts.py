@@ -25,7 +25,7 @@ import numpy as np
 
 from suboctave.continuation.linear import length
 from suboctave.continuation.march import March
-from suboctave.continuation.newton import NewtonOptions, correct
+from suboctave.continuation.newton import NewtonOptions, correct, null_row
 from suboctave.continuation.point import CurvePoint, make_point
 from suboctave.continuation.problem import Array
 from suboctave.continuation.stepping import SteppingOptions
@@ -175,9 +175,8 @@ def _settled(
         settled = curve.balance.settle(x, omega, values)
         if settled is not curve.balance:
             curve = curve.with_balance(settled)
-        weights, row = curve.weights(u, largest), curve.parameter
-        if nearest:
-            row = np.linalg.svd(curve.evaluate(u).jacobian / weights)[2][-1]
+        weights = curve.weights(u, largest)
+        row = null_row(curve, u, weights) if nearest else curve.parameter
         solved = correct(curve, u, row, weights, newton)
         adapted = curve.adapted(solved.u, solved.evaluation)
         if adapted is curve:

@@ -199,24 +199,26 @@ def _stretches(points: Sequence[BranchPoint], open_ones: list[int], name: str) -
     for first, last in _runs(open_ones):
         a, b = points[max(first - 1, 0)], points[min(last + 1, len(points) - 1)]
         result = points[first].floquet
-        ends = _value(a, name), _value(b, name)
         # at a point where a pair lies on the circle the product may be one by chance
         if all(point.floquet.undamped for point in (a, points[first], b)):
             notes.append(
-                f"between {name} = {ends[0]:.9g} and {ends[1]:.9g} the motion is undamped: its multipliers stay on the "
-                "unit circle, and nothing settles which side of it they are on"
+                f"between {name} = {_value(a, name):.9g} and {_value(b, name):.9g} the motion is undamped: its "
+                "multipliers stay on the unit circle, and nothing settles which side of it they are on"
             )
             continue
-        i = int(np.argmax(_open(result)))
-        worst = written(result.multipliers[i], result.errors[i])
-        stretch = Unsettled(
-            name,
-            *ends,
-            (a.arclength, b.arclength),
-            f"stability is open: a multiplier, {worst} by {result.method}, lies within its error of the unit circle",
-        )
-        stretches.append(stretch)
+        words = f"{_worst(result)} by {result.method}, lies within its error of the unit circle"
+        stretches.append(_stretch(a, b, name, f"stability is open: a multiplier, {words}"))
     return stretches, notes
+
+
+def _worst(result: FloquetResult) -> str:
+    """The largest multiplier within its error of the unit circle, with that error."""
+    i = int(np.argmax(_open(result)))
+    return written(result.multipliers[i], result.errors[i])
+
+
+def _stretch(a: BranchPoint, b: BranchPoint, name: str, reason: str) -> Unsettled:
+    return Unsettled(name, _value(a, name), _value(b, name), (a.arclength, b.arclength), reason)
 
 
 def _replaced(points: Sequence[BranchPoint], method: StabilityMethod, name: str) -> list[str]:
@@ -252,16 +254,8 @@ def _between(
     reach = points[max(first - 1, 0)].arclength, points[min(last + 1, len(points) - 1)].arclength
     if _explained(result, reach, bifurcations):
         return None
-    i = int(np.argmax(_open(result)))
-    worst = written(result.multipliers[i], result.errors[i])
-    return Unsettled(
-        name,
-        _value(points[low], name),
-        _value(points[high], name),
-        (points[low].arclength, points[high].arclength),
-        f"a multiplier, {worst} at {name} = {_value(probe, name):.9g}, comes within its error of the unit circle "
-        "and may pass it",
-    )
+    words = f"{_worst(result)} at {name} = {_value(probe, name):.9g}, comes within its error of the unit circle"
+    return _stretch(points[low], points[high], name, f"a multiplier, {words} and may pass it")
 
 
 def _within(stretch: Unsettled, known: Unsettled) -> bool:

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
 from suboctave.continuation.linear import Factor, length
-from suboctave.continuation.newton import NewtonOptions, correct
+from suboctave.continuation.newton import NewtonOptions, correct, null_row
 from suboctave.continuation.point import CurvePoint, make_point, solved_again
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.sample import Sample
@@ -21,11 +20,6 @@ BEGINNING = 1e-5
 _AT_ZERO, _SECANT = 1e-10, 1e-6
 #: share of its first value from which on a function's secants are no rounding
 _ROUNDING = 1e-3
-#: way along the tangent that leads no further off the curve than rounding, and its product with the secant's length
-#: from which on what the secant leaves is less than that
-_STRAIGHT, _SURE = 1e-7, 1e-13
-#: inverse of the component along the last parameter up to which a curve's direction is found at the first attempt
-_STEEP = 100.0
 #: shortest corrections towards a curve before a point of it is solved for
 _SHORTEST = 6
 
@@ -68,28 +62,6 @@ def nearest_point(
         u = u - factor.solve(np.append(evaluation.residual, 0.0)) / weights
         row = null_row(curve, u, weights)
     return make_point(correct(curve, u, row, weights, newton), curve, row / weights, 0.0)
-
-
-def null_row(curve: MotionProblem, u: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Unit vector that the scaled Jacobian at u maps to zero: the curve's direction there."""
-    jacobian = curve.evaluate(u).jacobian / weights
-    last = np.zeros(len(u))
-    last[-1] = 1.0
-    row = last
-    for _ in range(2):
-        factor = Factor.of(np.vstack((jacobian, row)))
-        direction = factor.solve(last) if not factor.singular else None
-        if direction is None or not np.isfinite(direction).all():
-            break
-        size = length(direction)
-        row = direction / size
-        if size < _STEEP:
-            return row
-        # the second time the row is the direction itself, so that the matrix is as regular as can be
-    else:
-        return row
-    result: np.ndarray = np.linalg.qr(jacobian.T, mode="complete")[0][:, -1]
-    return result
 
 
 def zero_along(
@@ -146,26 +118,9 @@ def zero_along(
             change = -2.0 * (s - old)
         if abs(change) < _AT_ZERO:
             return sample
-        if abs(change) < _STRAIGHT and abs(change * (s - old)) < _SURE:
-            beside = _beside(last, -change, newton)
-            if beside is not None:
-                return beside
         # on the straight line through the last two, in the plane that belongs to the next
         guess = solved.u - change * (solved.u - before) / (s - old)
         s, old, value_old, before = s - change, s, value, solved.u
         if abs(s) > reach:
             break
     raise ConvergenceError(f"no zero found beside {start.curve.where(start.u)}")
-
-
-def _beside(point: CurvePoint, way: float, newton: NewtonOptions) -> Sample | None:
-    """The point so little further along a curve that its tangent leads there; None if it is no solution."""
-    factor, evaluation = point.factor, point.evaluation
-    if factor is None or factor.singular:
-        return None
-    missing: np.ndarray = factor.solve(np.append(evaluation.residual, 0.0)) / point.weights
-    u = point.u - missing + way * point.tangent
-    evaluation = point.curve.evaluate(u)
-    if evaluation.error > newton.tolerance:
-        return None
-    return Sample(replace(point, u=u, evaluation=evaluation, arclength=point.arclength + way))

@@ -12,7 +12,7 @@ import numpy as np
 from suboctave.bifurcation.bifurcation import Bifurcation, TrackedEvent, kind_of
 from suboctave.continuation import CurvePoint
 from suboctave.continuation.linear import length
-from suboctave.continuation.newton import correct, tangent
+from suboctave.continuation.newton import correct, null_row, tangent
 from suboctave.continuation.point import make_point
 from suboctave.curves.augmentation import Augmentation
 from suboctave.curves.discretisation import own_linear_part, rule_of
@@ -22,7 +22,6 @@ from suboctave.curves.kinds.extremum_bordered import BorderedExtremal
 from suboctave.curves.kinds.singular import SingularOperator
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.trace import Settings
-from suboctave.curves.tracked.nearest import null_row
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.evaluation import HarmonicBalance
