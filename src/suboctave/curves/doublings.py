@@ -47,38 +47,43 @@ class DoublingWatch:
     kind: BifurcationKind
     locate: Callable[[BifurcationKind, Sample, Sample], Located | None]
     _falling: Pair | None = None
-    _open: list[tuple[Pair, bool]] = field(default_factory=list)
-    _last: Sample | None = None
+    #: between which samples a multiplier passes -1, where the system was solved for, and the places found with how far
+    #: off they may lie, all in scaled arclength
+    _passages: list[Pair] = field(default_factory=list)
+    _tried: list[tuple[float, float]] = field(default_factory=list)
+    _found: list[tuple[float, float]] = field(default_factory=list)
 
     def passed(self, a: Sample, b: Sample) -> list[tuple[Located, Sample, Sample]]:
         """The period doublings that the step from a to b leads to, each with the samples it lies between."""
-        if PERIOD_DOUBLING.changed(a, b):
-            self._open.append(((a, b), False))
+        self.moved(a, b)
         doublings = []
         for p, q in self._indicated(a, b):
-            low, high = p.point.arclength, q.point.arclength
-            self._open = [(pair, known or _within(pair, low, high)) for pair, known in self._open]
+            way = q.place - p.place
+            self._tried.append((p.place, q.place))
             located = self.locate(self.kind, p, q)
             if located is not None:
                 doublings.append((located, p, q))
-                self._explained(low + located.fraction * (high - low), _ASIDE * (high - low))
-        self._last = a
+                self._found.append((p.place + located.fraction * way, _ASIDE * way))
         return doublings
 
     def moved(self, old: Sample, again: Sample) -> None:
-        """The same motion was solved for with other harmonics: its test functions jump a little."""
+        """The next sample, or the same motion with other harmonics, where test functions jump a little."""
         if PERIOD_DOUBLING.changed(old, again):
-            self._open.append(((old, again), False))
+            self._passages.append((old, again))
 
-    def missed(self, everything: bool = False) -> list[tuple[Sample, Sample, str]]:
-        """What has been passed without a period doubling being found, by from, to and a reason, each once.
+    def missed(self) -> list[tuple[Sample, Sample, str]]:
+        """What has been passed without a period doubling being found, by from, to and a reason."""
+        left = list(self._passages)
+        for place, reach in self._found:
+            # the passage of -1 nearest to a period doubling is that
+            nearest = min(left, key=lambda pair: _distance(pair, place), default=None)
+            if nearest is not None and _distance(nearest, place) <= reach:
+                left.remove(nearest)
+        reasons = [_UNSOLVED if self._in_vain(pair) else _MISSED.format(test=self.test) for pair in left]
+        return [(a, b, reason) for (a, b), reason in zip(left, reasons, strict=True)]
 
-        The last two steps are left out unless `everything` is wanted: the determinant tells of them later.
-        """
-        since = None if everything or self._last is None else self._last.point.arclength
-        done = [item for item in self._open if since is None or item[0][1].point.arclength < since]
-        self._open = [item for item in self._open if item not in done]
-        return [(a, b, _UNSOLVED if known else _MISSED.format(test=self.test)) for (a, b), known in done]
+    def _in_vain(self, pair: Pair) -> bool:
+        return any(low <= pair[0].place and pair[1].place <= high for low, high in self._tried)
 
     def forget(self) -> None:
         """What lies behind says nothing of what comes."""
@@ -98,12 +103,6 @@ class DoublingWatch:
                 return [pair]
         return [(before[0], b)]
 
-    def _explained(self, place: float, reach: float) -> None:
-        """A period doubling was found at an arclength: the passage of -1 nearest to it is that."""
-        nearest = min(self._open, key=lambda item: _distance(item[0], place), default=None)
-        if nearest is not None and _distance(nearest[0], place) <= reach:
-            self._open.remove(nearest)
-
 
 def leading(sample: Sample) -> float:
     """`sign(Re mu) |mu| + 1`, mu the multiplier of largest modulus (Eq. 25)."""
@@ -111,12 +110,6 @@ def leading(sample: Sample) -> float:
     return float(np.sign(mu.real) * abs(mu)) + 1.0
 
 
-def _within(pair: Pair, low: float, high: float) -> bool:
-    """Whether a passage lies between two places."""
-    return low <= pair[0].point.arclength and pair[1].point.arclength <= high
-
-
 def _distance(pair: Pair, place: float) -> float:
     """How far outside a pair of samples a place lies; 0 inside."""
-    a, b = (s.point.arclength for s in pair)
-    return max(a - place, place - b, 0.0)
+    return max(pair[0].place - place, place - pair[1].place, 0.0)

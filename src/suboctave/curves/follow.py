@@ -89,7 +89,8 @@ class _Follower(Driver):
         trace.cut(trace.points[-1].arclength)
 
     def _finish(self) -> None:
-        self._say_missed(everything=True)
+        for p, q, reason in self._watch.missed() if self._watch is not None else ():
+            self._guard.doubt(p, q, reason)
         self.trace.audit = self._guard.audit
         if self._turned is not None and self.settings.half:
             self.trace.end_at(self._turned)
@@ -290,7 +291,6 @@ class _Follower(Driver):
                     self._guard.doubt(p, q, _NOT_FOUND["PD"])
                 else:
                     self._insert(item)
-            self._say_missed()
         for event in self.settings.events:
             crossed = self._event(event, a, b)
             if crossed is not None:
@@ -308,11 +308,6 @@ class _Follower(Driver):
             self._shown.append(item)
             insort(self.trace.bifurcations, item, key=lambda other: other.arclength)
         return not known
-
-    def _say_missed(self, everything: bool = False) -> None:
-        """What the published test function of period doublings has passed without notice."""
-        for p, q, reason in self._watch.missed(everything) if self._watch is not None else ():
-            self._guard.doubt(p, q, reason)
 
     def _located(self, kind: BifurcationKind, a: Sample, b: Sample) -> Located | None:
         """A bifurcation between two neighbours; a branch point only if its system was solved."""
