@@ -97,9 +97,8 @@ def frequency_response(
         if start is None and nu > 1:
             trace = subharmonic_start(curve, run)
         else:
-            trace = follow(start_point(curve, first, start, run.settings.newton), run.ahead, run.bounds, run.settings)
             given = _written(harmonics, options, subharmonic=subharmonic, linear=linear)
-            _warn_of_return(trace, "omega", first, f"so.frequency_response(system, ({last!r}, {first!r}){given})")
+            trace = _from_end(curve, start, run, f"so.frequency_response(system, ({last!r}, {first!r}){given})")
     return run.branch(trace)
 
 
@@ -197,11 +196,9 @@ def _from_system(
     run = CurveRun(system, parameter, (first, last), wanted, settings_of(system, options))
     # the branch may begin at rest
     curve = run.scaled(run.curve(float(omega), 1, None))
+    given = f", ({last!r}, {first!r}), omega={float(omega)!r}{_written(wanted, options)}"
     with run.reporting(options.get("progress"), f"along {parameter}") as run:
-        trace = follow(start_point(curve, first, None, run.settings.newton), run.ahead, run.bounds, run.settings)
-    given = _written(wanted, options)
-    call = f"so.continue_branch(system, {parameter!r}, ({last!r}, {first!r}), omega={float(omega)!r}{given})"
-    _warn_of_return(trace, parameter, first, call)
+        trace = _from_end(curve, None, run, f"so.continue_branch(system, {parameter!r}{given})")
     return run.branch(trace)
 
 
@@ -221,19 +218,20 @@ def _written(harmonics: Harmonics, options: CurveOptions, **more: Any) -> str:
     return "".join(words)
 
 
-def _warn_of_return(trace: Trace, name: str, first: float, call: str) -> None:
-    """Warn where a branch leaves its range at the end where it began: the motions at the other end lie on another one.
-
-    `call` follows that.
+def _from_end(curve: MotionProblem, start: Any, run: CurveRun, call: str) -> Trace:
+    """The branch from the first value on, with a warning where it leaves its range there: the motions at the other end
+    lie on another one, which `call` follows.
     """
-    if trace.closed or trace.interrupted or len(trace.points) < 2:
-        return
+    name, first = run.name, run.ends[0]
+    trace = follow(start_point(curve, first, start, run.settings.newton), run.ahead, run.bounds, run.settings)
     orbit = trace.points[-1].orbit
-    if (orbit.omega if name == "omega" else orbit.values[name]) == first:
+    back = len(trace.points) > 1 and (orbit.omega if name == "omega" else orbit.values[name]) == first
+    if back and not trace.closed and not trace.interrupted:
         trace.warnings.append(
             f"the branch folds back and leaves the range where it began, at {name} = {first:.6g}: what the other end "
             f"leads to lies on another branch, {call}"
         )
+    return trace
 
 
 #: share by which forces must deviate from linear ones for a motion to count as nonlinear
