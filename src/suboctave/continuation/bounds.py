@@ -42,12 +42,8 @@ class Bounds:
         return None
 
     def left(self, a: CurvePoint, b: CurvePoint, newton: NewtonOptions) -> CurvePoint | None:
-        """The point on a bound at which a curve leaves the range between two neighbours, None if it stays inside.
-
-        Raises
-        ------
-        ConvergenceError
-            If it leaves, and no solution is found exactly on the bound.
+        """The point on a bound at which a curve leaves the range between two neighbours, None if it stays inside;
+        ConvergenceError where it leaves and no solution is found exactly on the bound.
         """
         bound = self.passed(a, b)
         if bound is None:

@@ -325,12 +325,8 @@ class _Held(MotionProblem):
 
 
 def _released(curve: MotionProblem, value: float, newton: NewtonOptions) -> tuple[MotionProblem, Array]:
-    """The motion at a value of the parameter, followed from that of the held system, and its curve.
-
-    Raises
-    ------
-    ConvergenceError
-        If the path does not lead to the system itself.
+    """The motion at a value of the parameter, followed from that of the held system, and its curve; ConvergenceError
+    where the path does not lead to the system itself.
     """
     problem = _Held.of(curve, value)
     u = problem.first()

@@ -40,12 +40,8 @@ def locate_doubling(guess: Guess) -> Singular:
     """A period doubling by the published system, with the null vectors of J_half there.
 
     `residual` is that of the whole system, |N phi| in units of omega^2 included: as large as the harmonics left out.
-
-    Raises
-    ------
-    ConvergenceError
-        If Newton's method does not converge, or to a place where J_half is not singular: |g| may be least as well where
-        multipliers only come near -1.
+    ConvergenceError where Newton's method does not converge, or to a place where J_half is not singular: |g| may be
+    least as well where multipliers only come near -1.
     """
     solution = locate_singular(guess, Kind.HALF, PublishedDoubling)
     state = solution.state

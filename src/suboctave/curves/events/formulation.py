@@ -108,13 +108,7 @@ FORMULATIONS: dict[str, Formulation] = {f.name: f for f in (BORDERED, ExtendedSy
 
 
 def formulation_of(given: Formulation | str | None) -> Formulation:
-    """The formulation that a user asked for: an object, its name, or None for the default.
-
-    Raises
-    ------
-    InputError
-        For anything else.
-    """
+    """The formulation that a user asked for: an object, its name, or None for the default; InputError otherwise."""
     if given is None:
         return BORDERED
     if isinstance(given, str):

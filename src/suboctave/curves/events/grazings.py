@@ -110,13 +110,7 @@ class Touch(BifurcationKind):
         )
 
     def solve(self, guess: Guess) -> Grazing:
-        """Newton's method for the grazing from the nearest extremum of the guess's motion.
-
-        Raises
-        ------
-        ConvergenceError
-            If it does not converge.
-        """
+        """Newton's method for the grazing from the nearest extremum of the guess's motion; raises ConvergenceError."""
         augmentation = GrazingContactEquations.of(guess.state, self.element, self.index)
         evaluation, iterations = solve(guess, augmentation, np.array([self._nearest(guess.state)]))
         tau = float(evaluation.extra[0]) % (2.0 * math.pi)

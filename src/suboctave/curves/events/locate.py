@@ -148,12 +148,7 @@ def solve(guess: Guess, augmentation: Augmentation, extra: Array) -> tuple[Motio
 def locate_singular(guess: Guess, kind: Kind, operator: type[SingularOperator] = SingularOperator) -> Singular:
     """Locate a motion at which J_kappa is singular, kappa = 0, w0/2, or free (starting from `guess.kappa`).
 
-    `operator`: the equations that say so.
-
-    Raises
-    ------
-    ConvergenceError
-        If Newton's method does not converge from the guess.
+    `operator`: the equations that say so. ConvergenceError where Newton's method does not converge from the guess.
     """
     state, vectors = guess.state, guess.vectors
     if vectors is not None:
@@ -166,13 +161,8 @@ def locate_singular(guess: Guess, kind: Kind, operator: type[SingularOperator] =
 
 
 def locate_branch_point(guess: Guess) -> Singular:
-    """Locate a branch point in the free parameter.
-
-    Raises
-    ------
-    ConvergenceError
-        If Newton's method fails, or converges to a point whose unfolding is not zero: an imperfect (broken) branch
-        point.
+    """Locate a branch point in the free parameter; ConvergenceError where Newton's method fails, or converges to one
+    whose unfolding is not zero: an imperfect (broken) branch point.
     """
     evaluation, iterations = solve(guess, BranchPointUnfolded.of(guess.state, guess.name), np.zeros(1))
     equations = evaluation.equations

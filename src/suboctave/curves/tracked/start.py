@@ -116,12 +116,8 @@ def solved_start(
     ranges: Ranges,
     settings: Settings,
 ) -> CurvePoint:
-    """The bifurcation solved again as a point of the curve, in a basis that suits it.
-
-    Raises
-    ------
-    ConvergenceError
-        If it is not found again.
+    """The bifurcation solved again as a point of the curve, in a basis that suits it; ConvergenceError where it is not
+    found again.
     """
     curve, u = curve_through(item, basis, names, ranges, adaptive, settings.formulation)
     for name, (low, high) in ranges.items():
