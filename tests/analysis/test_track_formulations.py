@@ -67,7 +67,7 @@ def test_derivatives_by_differences(kind):
     omega, names, kappa = 1.3, ("omega", "s"), 0.3
     state = balance.at(x, omega)
     if kind == "published":
-        own, extra = PublishedDoubling.started(state, names=names)
+        own, extra = PublishedDoubling.started(state)
         augmentation = own.at(state, extra, names).renewed()
     else:
         augmentation, extra = ExtendedOperator.started(state, kind, kappa)

@@ -284,15 +284,14 @@ def _harmonics(item: Bifurcation, given: Any) -> tuple[Any, AdaptiveHarmonics | 
 def _both_ways(start: CurvePoint, ranges: Ranges, ahead: float, settings: Settings) -> Trace:
     """Follow a curve from a start to both sides; from a bound inwards only."""
     if start.tangent[-1] * ahead < 0.0:
-        start = replace(start, tangent=-start.tangent, orientation=-start.orientation)
-    turned = replace(start, tangent=-start.tangent, orientation=-start.orientation)
-    ways = [_leads_inside(point, ranges) for point in (start, turned)]
+        start = start.turned
+    ways = [_leads_inside(point, ranges) for point in (start, start.turned)]
     if not any(ways):
         raise InputError("the curve leaves the ranges at its start in both directions: widen them")
     forward = follow_tracked(start, ranges, settings) if ways[0] else None
     if forward is not None and (forward.closed or forward.interrupted or not ways[1]):
         return forward
-    back = follow_tracked(turned, ranges, settings)
+    back = follow_tracked(start.turned, ranges, settings)
     # closed the other way it is the whole curve, wherever this way came to an end
     return back if forward is None or back.closed else back.reversed_before(forward)
 

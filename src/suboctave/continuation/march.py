@@ -175,7 +175,7 @@ class March:
         """The start with its tangent pointing in the wanted direction."""
         point = self.start
         if point.tangent[point.curve.parameter] * self._direction < 0.0:
-            point = replace(point, tangent=-point.tangent, orientation=-point.orientation)
+            return point.turned
         return point
 
     @staticmethod

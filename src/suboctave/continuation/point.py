@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from suboctave.continuation.linear import Factor, cosine, distance, length
 from suboctave.continuation.newton import NewtonOptions, Solved, closely, correct, tangent
@@ -30,6 +30,11 @@ class CurvePoint:
     def parameter(self) -> float:
         """Value of the curve's free parameter."""
         return float(self.u[self.curve.parameter])
+
+    @property
+    def turned(self) -> CurvePoint:
+        """The same, headed the other way."""
+        return replace(self, tangent=-self.tangent, orientation=-self.orientation)
 
 
 def make_point(solved: Solved, curve: Curve, along: Array | None, arclength: float) -> CurvePoint:

@@ -163,7 +163,7 @@ def _last_before(
         return None, f"between {a.curve.where(a.u)} and {curve.where(there)}"
     point = close.point
     arclength = a.arclength + length(b.weights * (point.u - before))
-    last = replace(point, tangent=-point.tangent, orientation=-point.orientation, arclength=arclength)
+    last = replace(point.turned, arclength=arclength)
     return last, "" if close.smooth else f"between {curve.where(point.u)} and {curve.where(there)}"
 
 

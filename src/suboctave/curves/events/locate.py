@@ -153,7 +153,7 @@ def locate_singular(guess: Guess, kind: Kind, operator: type[SingularOperator] =
     state, vectors = guess.state, guess.vectors
     if vectors is not None:
         vectors = vectors.resized(state.basis, state.balance.size, kind)
-    own, extra = operator.started(state, kind, guess.kappa, vectors, (guess.name,))
+    own, extra = operator.started(state, kind, guess.kappa, vectors)
     evaluation, iterations = solve(guess, own, extra)
     equations = evaluation.equations
     assert isinstance(equations, SingularEquations)

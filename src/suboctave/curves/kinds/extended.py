@@ -39,12 +39,7 @@ class ExtendedOperator(SingularOperator):
 
     @classmethod
     def started(
-        cls,
-        state: BalanceState,
-        kind: Kind,
-        kappa: float = 0.0,
-        vectors: NullVectors | None = None,
-        names: tuple[str, ...] = ("omega",),
+        cls, state: BalanceState, kind: Kind, kappa: float = 0.0, vectors: NullVectors | None = None
     ) -> tuple[ExtendedOperator, Array]:
         """See `SingularOperator.started`; the unknowns are (kappa, phi)."""
         borders = null_vectors(state, kind, kappa) if vectors is None else vectors
@@ -172,12 +167,7 @@ class PublishedDoubling(SingularOperator):
 
     @classmethod
     def started(
-        cls,
-        state: BalanceState,
-        kind: Kind = Kind.HALF,
-        kappa: float = 0.0,
-        vectors: NullVectors | None = None,
-        names: tuple[str, ...] = ("omega",),
+        cls, state: BalanceState, kind: Kind = Kind.HALF, kappa: float = 0.0, vectors: NullVectors | None = None
     ) -> tuple[PublishedDoubling, Array]:
         waves = null_vectors(state, Kind.FREE, 0.5 * state.rate)
         borders = null_vectors(state, Kind.HALF) if vectors is None else vectors

@@ -43,25 +43,20 @@ class SingularOperator(Augmentation):
 
     @classmethod
     def started(
-        cls,
-        state: BalanceState,
-        kind: Kind,
-        kappa: float = 0.0,
-        vectors: NullVectors | None = None,
-        names: tuple[str, ...] = ("omega",),
+        cls, state: BalanceState, kind: Kind, kappa: float = 0.0, vectors: NullVectors | None = None
     ) -> tuple[SingularOperator, Array]:
         """The augmentation at a motion, with null vectors of its neighbourhood where they are known, and the start of
-        its unknowns; `names`: the free parameters.
+        its unknowns.
         """
-        borders = null_vectors(state, kind, kappa) if vectors is None else vectors
-        return cls(kind, borders, state.omega**2), np.array([kappa] if kind is Kind.FREE else [])
+        own = cls.of(state, kind, kappa) if vectors is None else cls(kind, vectors, state.omega**2)
+        return own, np.array([kappa] if kind is Kind.FREE else [])
 
     @classmethod
     def through(cls, item: Bifurcation, state: BalanceState, names: tuple[str, ...]) -> tuple[SingularOperator, Array]:
         kind, kappa = OPERATORS[kind_of(item)], 0.0
         if kind is Kind.FREE:
             kappa = item.kappa or float(np.angle(item.critical_multiplier())) * state.rate / (2.0 * np.pi)
-        return cls.started(state, kind, kappa, names=names)
+        return cls.started(state, kind, kappa)
 
     @property
     def name(self) -> str:
