@@ -100,7 +100,7 @@ def newton_extremum(
         published = _Published(curve, turning, weights)
         whole = correct(published, published.first(u), None, published.scale, options).u
         return whole[: len(u)]
-    bordered = with_extremum(curve, u, turning, (curve.names[0], curve.names[1]))
+    bordered = with_extremum(curve, u, turning)
     return correct(bordered, u, None, weights, options).u
 
 

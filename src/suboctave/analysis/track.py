@@ -33,7 +33,7 @@ from suboctave.continuation import CurvePoint, NewtonOptions, SteppingOptions
 from suboctave.continuation.linear import length, one_thread
 from suboctave.continuation.newton import correct
 from suboctave.continuation.point import point_ahead
-from suboctave.curves.discretisation import check_unknowns, harmonics_of
+from suboctave.curves.discretisation import check_unknowns, harmonics_of, rule_of
 from suboctave.curves.events.formulation import BorderedSystem
 from suboctave.curves.kinds.singular import SingularOperator
 from suboctave.curves.motion import MotionEvaluation, MotionProblem
@@ -41,7 +41,7 @@ from suboctave.curves.points import BranchPoint
 from suboctave.curves.subharmonic_part import repeats_earlier
 from suboctave.curves.trace import Settings, Trace
 from suboctave.curves.tracked.follow import follow_tracked
-from suboctave.curves.tracked.start import Ranges, curve_through, discretisation, inside, is_extremum, solved_start
+from suboctave.curves.tracked.start import Ranges, curve_through, inside, is_extremum, solved_start
 from suboctave.errors import ConvergenceError, InputError, is_number, shortened, suggest
 from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.evaluation import BalanceState
@@ -276,7 +276,10 @@ def _harmonics(item: Bifurcation, given: Any) -> tuple[Any, AdaptiveHarmonics | 
     """Harmonics wanted, the rule for them, and the basis that tracking begins with; by default as those of a start."""
     orbit = item.orbit
     wanted = harmonics_of(orbit) if given is None else given
-    adaptive, basis = discretisation(orbit.basis, wanted)
+    rule, basis = rule_of(wanted), orbit.basis
+    adaptive = rule if isinstance(rule, AdaptiveHarmonics) else None
+    if isinstance(rule, int):
+        basis = HarmonicBasis(rule * basis.nu, basis.nu)
     check_unknowns(orbit.balance.size, basis)
     return wanted, adaptive, basis
 

@@ -59,19 +59,15 @@ def gap_extrema(state: BalanceState) -> tuple[GapExtrema, ...]:
     gaps = []
     for own, motion in zip(state.laws.levels, state.motions, strict=True):
         if own:
-            turns = _rows(extrema(motion, grid[0], grid[1]))
+            turns = extrema(motion, *grid)
             gaps += [GapExtrema(element, place, level, *turns) for element, place, level in own]
     for channel in state.own_channels:
         for _, member in channel.members():
             places = levels_of(member.kind, member.coefficients)
             if places:
-                turns = _rows(extrema(channel.along.motion, grid[0], grid[1]))
+                turns = extrema(channel.along.motion, *grid)
                 gaps += [GapExtrema(member.number, place, level, *turns) for place, level in enumerate(places)]
     return tuple(gaps)
-
-
-def _rows(turns: Array) -> tuple[Array, Array, Array]:
-    return turns[0], turns[1], turns[2]
 
 
 def levels(local: LocalMotion) -> tuple[float, ...]:

@@ -25,7 +25,6 @@ from suboctave.curves.guard import Crossing, Passage, StepGuard
 from suboctave.curves.hidden import REASON, HiddenDoublings, pair_in
 from suboctave.curves.junction import UNSEEN, Meeting, meeting
 from suboctave.curves.motion import MotionProblem
-from suboctave.curves.points import BranchPoint
 from suboctave.curves.refine import bifurcation_at, solved_bifurcation, turns_at
 from suboctave.curves.sample import Sample
 from suboctave.curves.trace import Doubt, Settings, Trace
@@ -84,7 +83,7 @@ class _Follower(Driver):
         trace = self.trace
         if self.previous is None:
             self.previous = start = self._sample(self.march.start)
-            trace.points.append(BranchPoint(start.orbit, start.floquet, 0.0, start.point.iterations))
+            trace.points.append(start.as_point(start.floquet))
         # of the step that was under way nothing counts
         trace.cut(trace.points[-1].arclength)
 
@@ -183,8 +182,7 @@ class _Follower(Driver):
         for new in passed:
             if self.previous is not None:
                 self._search(self.previous, new)
-            where = new.point
-            self.trace.points.append(BranchPoint(new.orbit, new.verdict, where.arclength, where.iterations))
+            self.trace.points.append(new.as_point(new.verdict))
             self.previous = new
         self._crossings = []
         if passage is not None:
@@ -210,11 +208,7 @@ class _Follower(Driver):
                     self._count.noted(item)
             if len(items) < 2:
                 self._guard.doubt(stretch.before, stretch.behind, REASON)
-        self.trace.open += [
-            BranchPoint(s.orbit, s.floquet, s.point.arclength, s.point.iterations)
-            for s in passage.inside[1:-1]
-            if not s.floquet.decided
-        ]
+        self.trace.open += [s.as_point(s.floquet) for s in passage.inside[1:-1] if not s.floquet.decided]
 
     def _search_here(self, old: Sample, again: Sample) -> None:
         """Events that lie behind a point in one discretisation and before it in the next."""

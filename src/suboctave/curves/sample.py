@@ -24,6 +24,7 @@ from suboctave.curves.kinds.extremum import ExtremalEquations
 from suboctave.curves.kinds.grazing import GrazingEquations
 from suboctave.curves.kinds.singular import SingularEquations, SingularOperator
 from suboctave.curves.motion import MotionEvaluation, MotionProblem
+from suboctave.curves.points import BranchPoint
 from suboctave.floquet.methods import Monodromy, StabilityMethod
 from suboctave.floquet.result import FloquetResult
 from suboctave.harmonic.basis import Array, ComplexArray
@@ -56,6 +57,10 @@ class Sample:
     def at(self, point: CurvePoint) -> Sample:
         """Another point, with multipliers by the same method."""
         return Sample(point, self.method)
+
+    def as_point(self, result: FloquetResult) -> BranchPoint:
+        """The point with multipliers as a branch keeps it."""
+        return BranchPoint(self.orbit, result, self.place, self.point.iterations)
 
     @property
     def where(self) -> str:

@@ -89,12 +89,12 @@ def start_point(
             curve = curve.with_basis(given.basis)
         guess = _from_given(curve, value, given)
         try:
-            return _settled(curve, guess, newton, largest)
+            return settled(curve, guess, newton, largest)
         except ConvergenceError as failure:
             if isinstance(given, PeriodicOrbit):
                 # at a limit point the equations are singular at a fixed parameter: the nearest point of the curve
                 with suppress(ConvergenceError):
-                    return _settled(curve, guess, newton, largest, nearest=True)
+                    return settled(curve, guess, newton, largest, null_row)
             raise ConvergenceError(f"no motion found from the given start at {curve.where(guess)}: {failure}") from None
     patient = replace(newton, iterations=max(newton.iterations, 40), damped=True)
     ways: list[tuple[str, Callable[[], tuple[MotionProblem, Array]]]] = []
@@ -112,7 +112,7 @@ def start_point(
             begun, guess = guess_by()
             begun = curve.with_balance(begun.balance)
             loose = _unheld(begun, guess)
-            return _settled(begun, guess, patient, largest)
+            return settled(begun, guess, patient, largest)
         except ConvergenceError as failure:
             reason = str(failure)
             if reason not in tried:
@@ -164,26 +164,28 @@ def _like(curve: MotionProblem, adaptive: AdaptiveHarmonics | None, reference: f
     return replace(curve, adaptive=adaptive, tolerance=tolerance, reference=reference, cache=cache)
 
 
-def _settled(
-    curve: MotionProblem, u: Array, newton: NewtonOptions, largest: float, nearest: bool = False
+#: which unknown keeps its value, or the row that holds a point, at a vector u of a curve with its weights
+Held = Callable[[MotionProblem, Array, Array], Array | int]
+
+
+def settled(
+    curve: MotionProblem,
+    u: Array,
+    newton: NewtonOptions,
+    largest: float = 0.0,
+    held: Held = lambda curve, u, weights: curve.parameter,
 ) -> CurvePoint:
-    """Solve at the guess's parameter value, or for the nearest point of the curve whatever its value; again with more
-    harmonics while the motion asks.
-    """
+    """Solve from a guess, as a rule at its parameter value; again with more harmonics while the motion asks."""
     for _ in range(12):
-        x, omega, values = curve.split(u)
-        settled = curve.balance.settle(x, omega, values)
-        if settled is not curve.balance:
-            curve = curve.with_balance(settled)
+        balance = curve.balance.settle(*curve.split(u))
+        if balance is not curve.balance:
+            curve = curve.with_balance(balance)
         weights = curve.weights(u, largest)
-        row = null_row(curve, u, weights) if nearest else curve.parameter
-        solved = correct(curve, u, row, weights, newton)
+        solved = correct(curve, u, held(curve, u, weights), weights, newton)
         adapted = curve.adapted(solved.u, solved.evaluation)
-        if adapted is curve:
+        if adapted.balance is curve.balance:
             break
-        u = adapted.transfer(solved.u, curve)
-        assert isinstance(adapted, MotionProblem)
-        curve = adapted
+        u, curve = adapted.transfer(solved.u, curve), adapted
     return make_point(solved, curve, None, 0.0)
 
 

@@ -85,11 +85,9 @@ class _Asking:
 
     def settled(self, state: BalanceState, result: FloquetResult) -> FloquetResult:
         """The verdict where one is open, with witnesses."""
-
-        def question() -> FloquetResult:
-            return in_doubt(self.method.settled(state, result), fold_sign(state), half_sign(state))
-
-        return self._answer(question, result)
+        return self._answer(
+            lambda: in_doubt(self.method.settled(state, result), fold_sign(state), half_sign(state)), result
+        )
 
     def along(self, state: BalanceState, result: FloquetResult) -> FloquetResult:
         """The method's multipliers in place of others."""

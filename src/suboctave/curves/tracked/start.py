@@ -12,15 +12,15 @@ import numpy as np
 from suboctave.bifurcation.bifurcation import Bifurcation, TrackedEvent, kind_of
 from suboctave.continuation import CurvePoint
 from suboctave.continuation.linear import length
-from suboctave.continuation.newton import correct, null_row, tangent
-from suboctave.continuation.point import make_point
+from suboctave.continuation.newton import null_row
 from suboctave.curves.augmentation import Augmentation
-from suboctave.curves.discretisation import own_linear_part, rule_of
+from suboctave.curves.discretisation import own_linear_part
 from suboctave.curves.events.formulation import BORDERED, Formulation
 from suboctave.curves.kinds.extremum import LimitPointExtremal
 from suboctave.curves.kinds.extremum_bordered import BorderedExtremal
 from suboctave.curves.kinds.singular import SingularOperator
 from suboctave.curves.motion import MotionProblem
+from suboctave.curves.starts import settled
 from suboctave.curves.trace import Settings
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.basis import HarmonicBasis
@@ -44,14 +44,6 @@ def inside(values: Mapping[str, float], ranges: Ranges) -> bool:
 def is_extremum(item: Any) -> TypeGuard[TrackedEvent]:
     """Whether something is an extremum along a tracked curve, the ends of isolas among them."""
     return isinstance(item, TrackedEvent) and bool(item.extreme)
-
-
-def discretisation(basis: HarmonicBasis, wanted: Any) -> tuple[AdaptiveHarmonics | None, HarmonicBasis]:
-    """The rule for harmonics, None for a number of them, and the basis that tracking begins with."""
-    rule = rule_of(wanted)
-    if isinstance(rule, AdaptiveHarmonics):
-        return rule, basis
-    return None, HarmonicBasis(rule * basis.nu, basis.nu)
 
 
 def curve_through(
@@ -91,10 +83,10 @@ def curve_through(
     return curve, curve.join(x, np.array([item.parameter(name) for name in names]), extra)
 
 
-def with_extremum(curve: MotionProblem, u: np.ndarray, turning: str, plane: tuple[str, str]) -> MotionProblem:
-    """The curve with the equation of an extremum of one of the two parameters in its plane, at one of its points."""
+def with_extremum(curve: MotionProblem, u: np.ndarray, turning: str) -> MotionProblem:
+    """The curve with the equation of an extremum of one of its first two parameters, at one of its points."""
     extra = curve.extra(u)
-    (beside,) = set(plane) - {turning}
+    (beside,) = set(curve.names[:2]) - {turning}
     sizes = dict(zip(curve.names, curve.spans, strict=True))
     n = curve.balance.dimension
     extra_spans = 1.0 / curve.weights(u, 0.0)[n : n + len(extra)]
@@ -123,28 +115,24 @@ def solved_start(
     for name, (low, high) in ranges.items():
         u[curve.index(name)] = min(high, max(low, u[curve.index(name)]))
     if is_extremum(item):
-        curve = with_extremum(curve, u, item.parameter_name, (names[0], names[1]))
-    begin, origin, anywhere = u, curve, item.kind in MOTION_KINDS
-    along: np.ndarray | None = None
+        curve = with_extremum(curve, u, item.parameter_name)
+    anywhere = item.kind in MOTION_KINDS
     try:
-        for _ in range(8):
-            weights = curve.weights(u, 0.0)
-            row = null_row(curve, u, weights) if along is None else weights * along / length(weights * along)
-            solved = correct(curve, u, len(u) - 1 if abs(row[-1]) > 1e-2 else row, weights, settings.newton)
-            adapted = curve.adapted(solved.u, solved.evaluation)
-            same = adapted.balance.basis == curve.balance.basis and adapted.balance.samples == curve.balance.samples
-            if same:
-                break
-            along = adapted.transfer(tangent(solved), curve)
-            u, curve = adapted.transfer(solved.u, curve), adapted
-        moved = weights * (solved.u - curve.transfer(begin, origin))
-        if float(np.linalg.norm(moved)) > (_BESIDE if anywhere else _NEAR):
-            raise ConvergenceError(f"what was found lies elsewhere, at {curve.where(solved.u)}")
-        return make_point(solved, curve, None, 0.0)
+        start = settled(curve, u, settings.newton, held=_last_unless_it_turns)
+        moved = length(start.weights * (start.u - start.curve.transfer(u, curve)))
+        if moved > (_BESIDE if anywhere else _NEAR):
+            raise ConvergenceError(f"what was found lies elsewhere, at {start.curve.where(start.u)}")
+        return start
     except ConvergenceError as failure:
-        where = curve.where(begin)
+        where = curve.where(u)
         if anywhere:
             words = f"no {KINDS[item.kind].words} was found beside {where}: begin closer to it ({failure})"
         else:
             words = f"the {item.kind} at {where} was not found again: {failure}"
         raise ConvergenceError(words) from None
+
+
+def _last_unless_it_turns(curve: MotionProblem, u: np.ndarray, weights: np.ndarray) -> np.ndarray | int:
+    """The last parameter keeps its value, unless the curve about stands still in it."""
+    row = null_row(curve, u, weights)
+    return curve.parameter if abs(row[-1]) > 1e-2 else row
