@@ -282,7 +282,7 @@ def _guesses(curve: MotionProblem, value: float, seeds: Seeds) -> Iterator[Array
         if gcd(k, nu) > 1:
             continue
         for shape in _modes(balance)[: seeds.modes]:
-            for cosines in _resonant(curve, value, value * k / nu, shape):
+            for cosines in _resonant(curve, value * k / nu, shape):
                 for phase in 2.0 * np.pi * k / nu * np.arange(seeds.phases) / seeds.phases:
                     x = curve.split(base)[0].copy()
                     x[2 * k - 1] += np.cos(phase) * cosines
@@ -301,7 +301,7 @@ def _modes(balance: HarmonicBalance) -> list[Array]:
     return [s / length(weight * s) for s in shapes if length(weight * s) > 0.0]
 
 
-def _resonant(curve: MotionProblem, omega: float, frequency: float, shape: Array) -> list[Array]:
+def _resonant(curve: MotionProblem, frequency: float, shape: Array) -> list[Array]:
     """Free vibrations at a frequency by their first harmonic, cosines of each DOF: those that continue a linear mode.
 
     Where there are none some guesses in the shape of the mode.

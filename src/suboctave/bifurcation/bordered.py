@@ -75,10 +75,7 @@ def _resized(vector: np.ndarray, rows: int, two_sided: bool) -> np.ndarray:
 
 @dataclass(eq=False, slots=True)
 class Bordered:
-    """The scalar g of an operator at one motion, with what its gradient needs.
-
-    `known`: the factors of the bordered matrix, where there are any.
-    """
+    """The scalar g of an operator at one motion, with what its gradient needs; `factor`: of the bordered matrix."""
 
     state: BalanceState
     kind: Kind
@@ -87,15 +84,7 @@ class Bordered:
     right: np.ndarray
     left: np.ndarray
     scale: np.ndarray
-    borders: NullVectors
-    known: Factor | None
-
-    @property
-    def factor(self) -> Factor:
-        """LU factors of the bordered matrix."""
-        if self.known is None:
-            self.known = _factorised(self.state, self.kind, self.kappa, self.borders, self.scale)
-        return self.known
+    factor: Factor
 
     def gradient(self, names: tuple[str, ...]) -> tuple[np.ndarray, dict[str, complex], complex]:
         """Derivatives of g by the unknown coefficients (dimension,), by names, by kappa."""
@@ -106,11 +95,6 @@ class Bordered:
     def vectors(self) -> NullVectors:
         """Bordering vectors for the next iteration: the present null vectors, weighted and of unit length."""
         return NullVectors(_unit(self.right / self.scale), _unit(self.left / self.scale))
-
-    @property
-    def relative(self) -> float:
-        """|g| in units of omega^2: dimensionless."""
-        return abs(self.g) / self.state.omega**2
 
 
 def weighted_operator(state: BalanceState, kind: Kind, kappa: float) -> tuple[np.ndarray, np.ndarray]:
@@ -163,26 +147,20 @@ def bordered(state: BalanceState, kind: Kind, borders: NullVectors, kappa: float
     """Evaluate g and the vectors of its gradient, bordered by `borders` (b = left, c = right)."""
     n = len(borders.right)
     scale = state.balance.row_weights(n)
-    factor = _factorised(state, kind, kappa, borders, scale)
+    matrix = operator(state, kind, kappa)
     # the operator's own size balances the bordering rows
     size = state.omega**2
+    row = np.zeros(n + 1, dtype=matrix.dtype)
+    row[:n] = size * borders.right.conj()
+    left = (size * borders.left).astype(matrix.dtype)
+    factor = bordered_factor(matrix * scale[:, None], scale, left[:, None], row)
     rhs = np.zeros(n + 1, dtype=factor.lu.dtype)
     rhs[n] = size
     v = factor.solve(rhs)
     u = factor.solve(rhs, adjoint=True)
     # with b and c scaled by omega^2 the unknown multiplying b is g / omega^2
     g = complex(v[n]) * size
-    return Bordered(state, kind, kappa, g, v[:n] * scale, u[:n] * scale, scale, borders, factor)
-
-
-def _factorised(state: BalanceState, kind: Kind, kappa: float, borders: NullVectors, scale: Array) -> Factor:
-    """The bordered matrix with weights, borders in units of omega^2."""
-    matrix = operator(state, kind, kappa)
-    size, n = state.omega**2, len(matrix)
-    row = np.zeros(n + 1, dtype=matrix.dtype)
-    row[:n] = size * borders.right.conj()
-    left = (size * borders.left).astype(matrix.dtype)
-    return bordered_factor(matrix * scale[:, None], scale, left[:, None], row)
+    return Bordered(state, kind, kappa, g, v[:n] * scale, u[:n] * scale, scale, factor)
 
 
 def at_values(values: Mapping[str, float], name: str, value: float, omega: float) -> tuple[float, Mapping[str, float]]:

@@ -81,7 +81,6 @@ class Solved:
     factor: Factor
     iterations: int
     distance: float
-    contraction: float
 
 
 def closely(options: NewtonOptions) -> NewtonOptions:
@@ -146,7 +145,7 @@ def correct(
         if error <= options.tolerance and (settled or (iteration == 0 and known is None)):
             if factor is None or last is None or way > spare or not _takes_over(evaluation, last):
                 factor = factorised(evaluation, plane, weights)
-            return Solved(u, evaluation, weights, factor, iteration, distance(u, guess, weights), contraction)
+            return Solved(u, evaluation, weights, factor, iteration, distance(u, guess, weights))
         if iteration == options.iterations:
             break
         # after a short step that contracts, the old factors take the next one as far; where that is not far enough, new
@@ -162,7 +161,7 @@ def correct(
             step[row] = 0.0  # but for rounding of the factors it is
         still = options.rounding and previous <= options.correction and length(step) <= _ROUNDING
         if still and (nearest is None or error < nearest.evaluation.error):
-            nearest = Solved(u, evaluation, weights, factor, iteration, distance(u, guess, weights), contraction)
+            nearest = Solved(u, evaluation, weights, factor, iteration, distance(u, guess, weights))
         share = _decrease(curve, u, step / weights, error) if options.damped else options.share(step)
         u, size = u - share * step / weights, length(step)
         way, before = way + share * size, error

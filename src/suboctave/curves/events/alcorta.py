@@ -55,7 +55,7 @@ def locate_doubling(guess: Guess) -> Singular:
     if distance(there, here, problem.weights(here, 0.0)) > _BESIDE:
         raise ConvergenceError("no period doubling where the system is nearly solved: J_half is singular elsewhere")
     half = 0.5 * state.rate
-    defect = bordered(state, Kind.FREE, null_vectors(state, Kind.FREE, half), half).relative
+    defect = abs(bordered(state, Kind.FREE, null_vectors(state, Kind.FREE, half), half).g) / state.omega**2
     return replace(solution, vectors=confirmed.vectors, residual=max(solution.residual, defect))
 
 
