@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ast
 import math
+import operator
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -176,34 +177,40 @@ class _Reader:
         return Form("name", (name,), lambda values: values[name], frozenset([name]), {name: 1.0}, 1.0)
 
     def negative(self, node: ast.AST, inner: Form) -> Form:
-        f, value = inner.evaluate, inner.constant
-        if value is not None:
-            return self.known(node, "negative", (inner,), lambda: -value)
         affine = _scaled(inner.affine, -1.0)
-        return Form("negative", (inner,), lambda at: -f(at), inner.names, affine, inner.power, inner.size + 1.0)
+        return self.applied(node, "negative", operator.neg, (inner,), affine, inner.power, inner.size + 1.0)
 
     def call(self, node: ast.AST, name: str, arguments: list[Form]) -> Form:
-        function, closures = self.functions[name], [argument.evaluate for argument in arguments]
         size = 1.0 + sum(argument.size for argument in arguments)
-        if all(argument.constant is not None for argument in arguments):
-            return self.known(node, name, tuple(arguments), lambda: function(*(f({}) for f in closures)))
-        if name in _PAIRS:
+        if name in _PAIRS and any(argument.names for argument in arguments):
             if size > _MOST_OPERATIONS:
                 raise self.refuse(node, f"{name} of arguments this long; split it into terms")
             size += 2.0 + arguments[1].size
-        names = frozenset().union(*(argument.names for argument in arguments))
-        f, *others = closures
-        if others:
-            return Form(
-                name, tuple(arguments), lambda at: function(*(one(at) for one in closures)), names, None, 1.0, size
-            )
-        return Form(name, tuple(arguments), lambda at: function(f(at)), names, None, 1.0, size)
+        return self.applied(node, name, self.functions[name], tuple(arguments), None, 1.0, size)
 
-    def binary(self, node: ast.AST, operation: ast.operator, left: Form, right: Form) -> Form:
-        sign = _SIGNS.get(type(operation))
+    def applied(
+        self,
+        node: ast.AST,
+        operation: str,
+        function: Callable[..., float],
+        parts: tuple[Form, ...],
+        affine: dict[str, float] | None,
+        power: float,
+        size: float,
+    ) -> Form:
+        """An operation on one part or two."""
+        f, g = parts[0].evaluate, parts[-1].evaluate
+        evaluate: Evaluate = (lambda at: function(f(at), g(at))) if len(parts) == 2 else (lambda at: function(f(at)))
+        names = frozenset().union(*(part.names for part in parts))
+        if not names:
+            return self.known(node, operation, parts, lambda: evaluate({}))
+        return Form(operation, parts, evaluate, names, affine, power, size)
+
+    def binary(self, node: ast.AST, symbol: ast.operator, left: Form, right: Form) -> Form:
+        sign = _SIGNS.get(type(symbol))
         if sign is None:
-            other = "; write ** for a power" if isinstance(operation, ast.BitXor) else ""
-            shown = _WORDS.get(type(operation), type(operation).__name__)
+            other = "; write ** for a power" if isinstance(symbol, ast.BitXor) else ""
+            shown = _WORDS.get(type(symbol), type(symbol).__name__)
             raise self.refuse(node, f"the operation {shown} is not allowed{other}")
         a, b = left.constant, right.constant
         power = left.power + right.power if sign in "*/" else max(left.power, right.power)
@@ -211,34 +218,10 @@ class _Reader:
             power = left.power * abs(b)
             if max(1.0, left.power) * abs(b) > _LARGEST_POWER:
                 raise self.refuse(node, f"the power is larger than {_LARGEST_POWER}")
-        evaluate = _closure(sign, left.evaluate, right.evaluate, a, b)
-        if a is not None and b is not None:
-            return self.known(node, sign, (left, right), lambda: evaluate({}))
-        if sign == "/" and b == 0.0:
+        if sign == "/" and b == 0.0 and a is None:
             raise self.refuse(node, "division by zero")
-        names, size = left.names | right.names, left.size + right.size + 1.0
-        return Form(sign, (left, right), evaluate, names, _affine(sign, left, right), power, size)
-
-
-def _closure(sign: str, f: Evaluate, g: Evaluate, a: float | None, b: float | None) -> Evaluate:
-    """The closure of a binary operation; a constant operand is bound into it."""
-    power = math.pow  # refuses a root of a negative number, where ** would answer with a complex one
-    match sign:
-        case "+":
-            return lambda values: f(values) + g(values)
-        case "-":
-            return lambda values: f(values) - g(values)
-        case "*" if a is not None:
-            return lambda values: a * g(values)
-        case "*" if b is not None:
-            return lambda values: f(values) * b
-        case "*":
-            return lambda values: f(values) * g(values)
-        case "/":
-            return lambda values: f(values) / g(values)
-    if b is not None:
-        return lambda values: power(f(values), b)
-    return lambda values: power(f(values), g(values))
+        affine, size = _affine(sign, left, right), left.size + right.size + 1.0
+        return self.applied(node, sign, _OPERATIONS[sign], (left, right), affine, power, size)
 
 
 def _affine(sign: str, left: Form, right: Form) -> dict[str, float] | None:
@@ -266,6 +249,10 @@ def _scaled(factors: Mapping[str, float] | None, by: float) -> dict[str, float] 
     return None if factors is None else {name: by * factor for name, factor in factors.items()}
 
 
+# math.pow refuses a root of a negative number, where ** would answer with a complex one
+_OPERATIONS: dict[str, Callable[..., float]] = {
+    "+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv, "**": math.pow
+}  # fmt: skip
 _SIGNS: dict[type, str] = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**"}
 _WORDS = {
     ast.Attribute: "a dot between names",
