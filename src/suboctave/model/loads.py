@@ -67,7 +67,7 @@ class Load(Recorded, ABC, family="load"):
         return tuple((name, getattr(self, name)) for name in self.coefficient_names)
 
     @abstractmethod
-    def components(self, n: int, matrices: Matrices | None = None) -> tuple[LoadComponent, ...]:
+    def components(self, n: int, matrices: Matrices) -> tuple[LoadComponent, ...]:
         """Its cosines in a structure of n degrees of freedom; constant parts are of harmonic 0.
 
         `matrices`: those of the structure, for loads of inertia and of moving bases.
@@ -139,7 +139,7 @@ class HarmonicLoad(Load):
         """The vector (n,) along which the load acts."""
         return self.place.direction(n)
 
-    def components(self, n: int, matrices: Matrices | None = None) -> tuple[LoadComponent, ...]:
+    def components(self, n: int, matrices: Matrices) -> tuple[LoadComponent, ...]:
         """The cosines of this load, the static part last (harmonic 0)."""
         direction = self.direction(n)
         cosines = [
@@ -170,7 +170,7 @@ class StaticLoad(Load):
         self.place = Place("StaticLoad", dof, direction)
         self._take(force=force)
 
-    def components(self, n: int, matrices: Matrices | None = None) -> tuple[LoadComponent, ...]:
+    def components(self, n: int, matrices: Matrices) -> tuple[LoadComponent, ...]:
         return (LoadComponent(self.place.direction(n), 0, self.force, ZERO),)
 
 
@@ -203,7 +203,7 @@ class RotatingUnbalance(Load):
         self._take(mass_eccentricity=mass_eccentricity, phase=phase)
         self.harmonic = self._read_harmonic(harmonic, 1)
 
-    def components(self, n: int, matrices: Matrices | None = None) -> tuple[LoadComponent, ...]:
+    def components(self, n: int, matrices: Matrices) -> tuple[LoadComponent, ...]:
         amplitude = coefficient(f"({self.mass_eccentricity.text}) * {self.harmonic**2} * omega**2")
         phases = (self.phase, _sum(self.phase, _QUARTER))
         return tuple(
@@ -232,11 +232,6 @@ class _WithMatrices(Load):
             if np.any(vector)
         ]
 
-    def _matrices(self, matrices: Matrices | None) -> Matrices:
-        if matrices is None:
-            raise InputError(f"{self.label} needs the matrices of the system it belongs to")
-        return matrices
-
 
 class Gravity(_WithMatrices):
     """The weight `M r g`: `acceleration` g (length / time^2), along the direction r (n,), by default all DOFs alike.
@@ -251,9 +246,8 @@ class Gravity(_WithMatrices):
         super().__init__(direction)
         self._take(acceleration=acceleration)
 
-    def components(self, n: int, matrices: Matrices | None = None) -> tuple[LoadComponent, ...]:
-        mass = self._matrices(matrices)[0]
-        return tuple(self._along(mass, self.direction(n), 0, f"({self.acceleration.text})", ZERO))
+    def components(self, n: int, matrices: Matrices) -> tuple[LoadComponent, ...]:
+        return tuple(self._along(matrices[0], self.direction(n), 0, f"({self.acceleration.text})", ZERO))
 
 
 class _Base(_WithMatrices):
@@ -281,8 +275,8 @@ class _Base(_WithMatrices):
         self._take(amplitude=amplitude, phase=phase)
         self.harmonic = self._read_harmonic(harmonic, 1)
 
-    def components(self, n: int, matrices: Matrices | None = None) -> tuple[LoadComponent, ...]:
-        mass, damping, stiffness = self._matrices(matrices)
+    def components(self, n: int, matrices: Matrices) -> tuple[LoadComponent, ...]:
+        mass, damping, stiffness = matrices
         r, k, given = self.direction(n), self.harmonic, f"({self.amplitude.text})"
         frequency = f"({k}*omega)"
         if self.coordinates == "relative":
