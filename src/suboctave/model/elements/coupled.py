@@ -139,7 +139,7 @@ def as_coupled(element: BaseElement) -> CoupledElement | Law | _OneInput:
     """The law of any element in the form of a coupled one, `f(q, theta; c)`."""
     if isinstance(element, CoupledElement):
         return element
-    if isinstance(element, WrittenElement):
+    if isinstance(element, WrittenElement) and type(element).tangent is WrittenElement.tangent:
         return element.law
     assert isinstance(element, Element)
     return _OneInput(element)
