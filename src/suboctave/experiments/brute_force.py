@@ -61,9 +61,6 @@ class BruteForceDiagram(TimeResult):
         (S, V, P, n): the largest |x_i| in the period before each point.
     complete
         False where an interruption (Ctrl-C) left values out.
-
-    `plot` draws the motions, one colour for each period, over branches if any are given as `curves`; options are those
-    of `pictures.plot_brute_force`: `curves`, `quantity` ("amplitude" or "section"), `starts`, `dof`, `title`, `size`.
     """
 
     contents = "brute force"
@@ -128,6 +125,14 @@ class BruteForceDiagram(TimeResult):
         ]
         own = ("start", "kind", "period", "amplitude", "defect")
         return pd.DataFrame(rows, columns=[parameter_column(self.name, own), *own])
+
+    def plot(self, path: Any = None, curves: Any = None, **options: Any) -> Any:
+        """Draw the motions, one colour for each period, over branches if any are given; saved to a path.
+
+        Options are those of `pictures.plot_brute_force`: `quantity` ("amplitude" or "section"), `starts`, `dof`,
+        `title`, `size`.
+        """
+        return super().plot(path, curves=curves, **options)
 
     def __repr__(self) -> str:
         counts = []

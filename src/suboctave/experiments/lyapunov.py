@@ -463,33 +463,29 @@ def separate(
     starts[1:, system.observed_dof] += offsets
     weight = np.sqrt(np.diagonal(system.mass.value({**system.parameters, **values})))
     metric: Array = np.concatenate([float(omega) * weight, weight])
-    settings = how.steps_per_period if how.integrator == "newmark" else how.tolerances
-    rates, rows, distances = [], [], []
+    newmark = how.integrator == "newmark"
+    settings: Sequence[float] = how.steps_per_period if newmark else how.tolerances
+    rates, distances = [], []
     time: Array = np.arange(how.periods + 1, dtype=float) * (2.0 * np.pi / float(omega))
     for i, setting in enumerate(settings):
-        if how.integrator == "newmark":
-            # what Newton's method leaves must stay below the offset
-            flow = Flow(system, "newmark", steps_per_period=int(setting), tolerance=1e-14, lanes=8)
-        else:
-            flow = Flow(system, "accurate", tolerance=float(setting), lanes=8)
+        # what Newton's method leaves must stay below the offset
+        steps, tolerance = (int(setting), 1e-14) if newmark else (1000, float(setting))
+        flow = Flow(system, how.integrator, steps_per_period=steps, tolerance=tolerance, lanes=8)
         motions = flow.over(starts, omega, how.periods, values, workers=workers).whole()
         if motions.failed.any():
             motions.checked()
         states = np.concatenate([starts[:, None], motions.states], axis=1) * metric
         size = float(np.max(np.linalg.norm(states[0], axis=1)))
-        for offset, other in zip(offsets, states[1:], strict=True):
-            distance = np.linalg.norm(other - states[0], axis=1)
-            distances.append(distance)
-            rates.append(_slope(time, distance, how.saturation * size))
-            rows.append((float(setting), offset))
+        distances.append(np.linalg.norm(states[1:] - states[0], axis=2))
+        rates += [_slope(time, distance, how.saturation * size) for distance in distances[-1]]
         if report is not None:
             report((i + 1) / len(settings), f"{i + 1} of {len(settings)} settings")
-    if n and not np.isfinite(np.array(distances)).all():
+    distance = np.concatenate(distances)
+    if n and not np.isfinite(distance).all():
         raise ConvergenceError("the motion leaves the range of numbers: it grows without bound")
-    return Separation(
-        np.array(rates), np.array(rows), time, np.array(distances), float(omega), {**system.parameters, **values},
-        how, system,
-    )  # fmt: skip
+    rows = np.array([(float(setting), offset) for setting in settings for offset in offsets])
+    parameters = {**system.parameters, **values}
+    return Separation(np.array(rates), rows, time, distance, float(omega), parameters, how, system)
 
 
 def _slope(time: Array, distance: Array, limit: float) -> float:

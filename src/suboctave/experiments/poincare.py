@@ -267,20 +267,19 @@ def distinct(system: System, all_of: Sequence[Attractor], tolerance: float) -> l
 
     Periodic ones are the same if their points are, to a hundred times the tolerance.
     """
-    kept: list[tuple[Attractor, Array]] = []
-    counts: list[int] = []
+    groups: list[list[Attractor]] = []
     for one in all_of:
         sizes = state_sizes(system, one.largest[None], one.omega, one.parameters)
-        for i, (other, _) in enumerate(kept):
+        for group in groups:
+            other = group[0]
             if other.period == one.period and (
                 not one.period or same_cycle(other.points, one.points, sizes, _WIDER * tolerance)
             ):
-                counts[i] += 1
+                group.append(one)
                 break
         else:
-            kept.append((one, sizes))
-            counts.append(1)
-    counted = [replace(one, count=count) for (one, _), count in zip(kept, counts, strict=True)]
+            groups.append([one])
+    counted = [replace(group[0], count=len(group)) for group in groups]
     return sorted(counted, key=lambda one: -one.amplitude)
 
 

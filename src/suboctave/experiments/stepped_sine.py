@@ -278,9 +278,6 @@ class SteppedSine(TimeResult):
         (S,): at which frequency the tap was given, nan without one.
     complete
         False where an interruption (Ctrl-C) left steps out.
-
-    `plot` draws the fundamentals, over branches (`curves`) and beside data of a rig (`measured`) if any are given;
-    options are those of `pictures.plot_stepped_sine`: `curves`, `measured`, `harmonic`, `dof`, `title`, `size`.
     """
 
     contents = "stepped sine"
@@ -342,6 +339,13 @@ class SteppedSine(TimeResult):
         names = ["direction", "omega", "amplitude", "phase_deg"]
         names += [f"harmonic_{k:g}" for k in self.multiples if k != 1.0]
         return pd.DataFrame(rows, columns=[*names, "largest", "period"])
+
+    def plot(self, path: Any = None, curves: Any = None, measured: Any = None, **options: Any) -> Any:
+        """Draw the measured fundamentals, over branches and beside data of a rig if any are given; saved to a path.
+
+        Options are those of `pictures.plot_stepped_sine`: `harmonic`, `dof`, `title`, `size`.
+        """
+        return super().plot(path, curves=curves, measured=measured, **options)
 
     def __repr__(self) -> str:
         done, settled = int((self.period >= 0).sum()), int((self.period > 0).sum())
