@@ -343,7 +343,7 @@ class _Run:
     def _follow(self, g: int, report: Report | None) -> None:
         members, method, batch = self.groups[g], self.method, self.batch
         # what is missing from the last group is made up by its first one, but stands still where it may
-        filled = np.array([members[i] if i < len(members) else members[0] for i in range(method.rows.lanes)])
+        filled = np.array([*members, *[members[0]] * (method.rows.lanes - len(members))])
         group = Group(method, batch, filled, len(members))
         effort, arrived = method.effort, False
         while not arrived and not self._stopped():

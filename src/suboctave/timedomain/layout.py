@@ -142,15 +142,11 @@ class Layout:
 
     def wave_table(self, points: int) -> Array:
         """The waves (points, W) at the instants `2 pi i / points` of the phase."""
-        turn = np.arange(points) / points
+        harmonics, sines = np.array(self.waves, dtype=float).reshape(-1, 2).T
         # the angle is reduced before it is rounded: multiples of a period are the same number
-        return np.stack(
-            [
-                (np.sin if sine else np.cos)(2.0 * np.pi * ((harmonic * turn) % 1.0))
-                for harmonic, sine in self.waves
-            ],
-            axis=1,
-        ) if self.waves else np.zeros((points, 0))  # fmt: skip
+        angle = 2.0 * np.pi * (np.outer(np.arange(points) / points, harmonics) % 1.0)
+        waves: Array = np.where(sines > 0.0, np.sin(angle), np.cos(angle))
+        return waves
 
     # ------------------------------------------------------------------------------------------------------ lengths
     def sizes(self, numbers: Numbers, states: Array, which: NDArray[np.int_]) -> Array:
