@@ -47,7 +47,12 @@ def figure_data(drawing: Drawing, name: str) -> dict[str, Any]:
     # a legend entry belongs to what is drawn on top
     shown = {item.name: item for item in sorted(frame.items, key=lambda item: item.layer) if item.name}
     data: list[dict[str, Any]] = []
-    for items in _traces(frame.items):
+    # one trace for all strokes of one look and name, and one for every other thing
+    traces: dict[Any, list[Item]] = {}
+    for number, item in enumerate(frame.items):
+        key: Any = (item.name, item.role, item.pen) if isinstance(item, Polyline) else number
+        traces.setdefault(key, []).append(item)
+    for items in traces.values():
         item = items[0]
         entry = {
             "name": html_of(item.name),
@@ -61,15 +66,6 @@ def figure_data(drawing: Drawing, name: str) -> dict[str, Any]:
         data.append(_labels(frame.labels, drawing.axes))
     layout = _space(drawing) if in_space else _plane(drawing)
     return {"data": data, "layout": layout, "name": name, **({"space": True} if in_space else {})}
-
-
-def _traces(items: Sequence[Item]) -> list[list[Item]]:
-    """What belongs into one trace: all strokes of one look and name, and every other thing by itself."""
-    traces: dict[Any, list[Item]] = {}
-    for number, item in enumerate(items):
-        key: Any = (item.name, item.role, item.pen) if isinstance(item, Polyline) else number
-        traces.setdefault(key, []).append(item)
-    return list(traces.values())
 
 
 def _trace(items: Sequence[Item], axes: Sequence[Axis]) -> dict[str, Any]:
@@ -218,13 +214,11 @@ def html_of(text: str) -> str:
     pieces = re.split(r"(?<!\\)\$", html.escape(text))
     if len(pieces) % 2 == 0:  # a single dollar sign is itself
         return html.escape(text).replace(r"\$", "$")
-    pieces[1::2] = [_formula(piece) for piece in pieces[1::2]]
+    for i in range(1, len(pieces), 2):
+        formula = pieces[i]
+        for spelling, letter in _MATH:
+            formula = formula.replace(spelling, letter)
+        for command, accent in (("ddot", "\u0308"), ("dot", "\u0307")):
+            formula = re.sub(rf"\\{command}{{(\w)((?:_{{\w+}}|_\w)?)}}", rf"\1{accent}\2", formula)
+        pieces[i] = re.sub(r"_{(\w+)}|_(\w)", r"<sub>\1\2</sub>", formula)
     return "".join(pieces).replace(r"\$", "$")
-
-
-def _formula(text: str) -> str:
-    for spelling, letter in _MATH:
-        text = text.replace(spelling, letter)
-    for command, accent in (("ddot", "\u0308"), ("dot", "\u0307")):
-        text = re.sub(rf"\\{command}{{(\w)((?:_{{\w+}}|_\w)?)}}", rf"\1{accent}\2", text)
-    return re.sub(r"_{(\w+)}|_(\w)", r"<sub>\1\2</sub>", text)

@@ -76,8 +76,13 @@ def plot_regimes(
     across, upwards = (np.linspace(*own, count + 1) for own, count in zip(ranges, cells.shape[::-1], strict=True))
     image = np.array([rgb(colour) for colour in colours]).reshape(-1, 3)[cells]
     dotted = isolated[cells] if len(regimes) else np.zeros(cells.shape, dtype=bool)
+
+    def rank(regime: Regime) -> tuple[Any, ...]:
+        key = _key(regime)
+        return _top(key), len(key[0]) + len(key[1]), key, _isolated(regime)
+
     frame = Frame([Raster(image, across, upwards, {DOTS: dotted}, layer=0.0)])
-    for number in sorted(range(len(regimes)), key=lambda i: _rank(regimes[i])):
+    for number in sorted(range(len(regimes)), key=lambda i: rank(regimes[i])):
         if np.count_nonzero(cells == number) > smallest * cells.size:
             hatch = DOTS if isolated[number] else ""
             words = regimes[number][0] if labels is None else labels[number]
@@ -120,11 +125,6 @@ def _top(key: tuple[tuple[int, ...], tuple[int, ...]]) -> tuple[int, bool]:
     """The longest period, and whether it stands for motions that were not followed."""
     known, beyond = key
     return (max(beyond), True) if beyond else (max(known, default=0), False)
-
-
-def _rank(regime: Regime) -> tuple[Any, ...]:
-    key = _key(regime)
-    return _top(key), len(key[0]) + len(key[1]), key, _isolated(regime)
 
 
 def _isolated(regime: Regime) -> bool:

@@ -21,7 +21,6 @@ from suboctave.pictures.isolas import is_isolas
 from suboctave.pictures.options import Coordinates, CurveOptions, View
 from suboctave.pictures.paper import draw, dress, figure_of, handles
 from suboctave.pictures.strokes import (
-    Seen,
     add_strokes,
     check_count,
     checked,
@@ -153,21 +152,24 @@ def response_frame(
         axes.check(dataset)
     check_count("labels", labels, len(group), "curves")
     periods = several_periods(group) if by_period is None else by_period
-    names = [plain(name) for name in (labels if labels is not None else _names(group, periods))]
+    names, pens = _names_and_pens(group, labels, periods)
     several = len(group) > 1
     titles = names if called is None else [plain(name) for name in called]
-    pens = _pens(group, names, periods)
     # sub-harmonic motions over those that they branch off from
     order = sorted(range(len(group)), key=lambda index: period_of(group[index])) if periods else range(len(group))
-    spread = _spread(np.concatenate([axes.of(dataset)[0] for dataset in group], axis=1))
+    at = np.concatenate([axes.of(dataset)[0] for dataset in group], axis=1)
+    known = [row[np.isfinite(row)] for row in at]
+    width, height = ((float(np.ptp(row)) if row.size else 0.0) or 1.0 for row in known)
     earlier: dict[Pen, list[np.ndarray]] = {}
     frame = Frame()
     for index in order:
         dataset, pen = group[index], pens[index]
         if labels is not None or several or periods:
             frame.entries[names[index]] = Entry(Pen(pen.colour, 1.3 * pen.width))
-        seen = _seen(titles[index] if several else "")
-        for stable in add_strokes(frame, dataset, axes, pen, seen, earlier=earlier, spread=spread) - {None}:
+        curve = titles[index] if several else ""
+        words = {**_ROLES, None: "motions"}
+        seen = {s: (_ROLES[s], f"{curve}: {words[s]}" if curve else words[s], curve or words[s]) for s in _ROLES}
+        for stable in add_strokes(frame, dataset, axes, pen, seen, earlier=earlier, spread=(width, height)) - {None}:
             # where ink is the colour of one period, the dashes are shown in a colour of none
             plain_pen = Pen(style.SOFT if periods else style.INK, 1.0, style.UNSTABLE_DASH)
             frame.entries[_ROLES[stable]] = Entry(plain_pen.along(stable))
@@ -188,19 +190,6 @@ def response_frame(
 _ROLES = {None: "curve", True: "stable", False: "unstable"}
 
 
-def _seen(curve: str) -> Seen:
-    """Role, name and group of the strokes of a curve, "" for the only one."""
-    words = {**_ROLES, None: "motions"}
-    return {s: (_ROLES[s], f"{curve}: {words[s]}" if curve else words[s], curve or words[s]) for s in _ROLES}
-
-
-def _spread(at: np.ndarray) -> tuple[float, float]:
-    """Width and height of what is drawn."""
-    known = [row[np.isfinite(row)] for row in at]
-    width, height = ((float(np.ptp(row)) if row.size else 0.0) or 1.0 for row in known)
-    return width, height
-
-
 def _as_list(curves: xarray.Dataset | Sequence[xarray.Dataset]) -> list[xarray.Dataset]:
     return checked(list(curves) if isinstance(curves, list | tuple) else [curves])
 
@@ -214,30 +203,22 @@ def _common_axis(datasets: Sequence[xarray.Dataset], x: str | None) -> str:
     return free[0]
 
 
-def _names(group: Sequence[xarray.Dataset], by_period: bool) -> list[str]:
-    """Of response curves what tells them apart, of tracked curves among them their kinds."""
-    tracked, responses = _parted(group)
-    words = dict(zip(tracked, boundary_names([group[i] for i in tracked]), strict=True))
-    if len(responses) == 1 and tracked:
-        words[responses[0]] = "response"
-    else:
-        words |= zip(responses, _tell_apart([group[i] for i in responses], by_period), strict=True)
-    return [words[i] for i in range(len(group))]
-
-
-def _pens(group: Sequence[xarray.Dataset], names: Sequence[str], by_period: bool) -> list[Pen]:
-    """Of response curves by period or in turn, of tracked curves among them those of their kinds."""
-    tracked, responses = _parted(group)
-    pens = dict(zip(tracked, boundary_styles([group[i] for i in tracked], [names[i] for i in tracked]), strict=True))
-    own = curve_styles([group[i] for i in responses], [names[i] for i in responses], by_period)
-    pens |= zip(responses, own, strict=True)
-    return [pens[i] for i in range(len(group))]
-
-
-def _parted(group: Sequence[xarray.Dataset]) -> tuple[list[int], list[int]]:
-    """The places of tracked curves, and of all others."""
+def _names_and_pens(
+    group: Sequence[xarray.Dataset], labels: Sequence[str] | None, by_period: bool
+) -> tuple[list[str], list[Pen]]:
+    """Of response curves what tells them apart, and pens by period or in turn; of tracked curves their kinds'."""
     tracked = [i for i, dataset in enumerate(group) if is_boundary(dataset)]
-    return tracked, [i for i in range(len(group)) if i not in tracked]
+    responses = [i for i in range(len(group)) if i not in tracked]
+    bounds, others = [group[i] for i in tracked], [group[i] for i in responses]
+    names, pens = dict(enumerate(labels or ())), dict[int, Pen]()
+    if labels is None:
+        names |= zip(tracked, boundary_names(bounds), strict=True)
+        alone = tracked and len(responses) == 1
+        names |= zip(responses, ["response"] if alone else _tell_apart(others, by_period), strict=True)
+    names = {i: plain(name) for i, name in names.items()}
+    pens |= zip(tracked, boundary_styles(bounds, [names[i] for i in tracked]), strict=True)
+    pens |= zip(responses, curve_styles(others, [names[i] for i in responses], by_period), strict=True)
+    return [names[i] for i in range(len(group))], [pens[i] for i in range(len(group))]
 
 
 def _tell_apart(datasets: Sequence[xarray.Dataset], by_period: bool = False) -> list[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
+from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -50,6 +51,14 @@ class CurveTables(Stored, ABC):
         if what not in frames:
             raise InputError(f"to_csv writes points or bifurcations, not {what!r}{suggest(str(what), frames)}")
         return write_csv(frames[what](), path, overwrite)
+
+
+def _over_points(path: str, meaning: str) -> Any:
+    """What every point has under a dotted name, as an array along the branch."""
+    read = attrgetter(path)
+    column = cached_property(lambda branch: np.array([read(point) for point in branch.points]))
+    column.__doc__ = meaning
+    return column
 
 
 class Branch(CurveTables, BranchReadings):
@@ -140,10 +149,18 @@ class Branch(CurveTables, BranchReadings):
         """The motions, in the order they were computed."""
         return [p.orbit for p in self.points]
 
-    @cached_property
-    def omega(self) -> Array:
-        """Circular frequency of the load, shape (len,)."""
-        return np.array([p.orbit.omega for p in self.points])
+    omega: Array = _over_points("orbit.omega", "Circular frequency of the load, shape (len,).")
+    multipliers: ComplexArray = _over_points(
+        "floquet.multipliers", "Floquet multipliers over the response period, by descending modulus, shape (len, 2 n)."
+    )
+    multiplier_errors: Array = _over_points("floquet.errors", "Estimated errors of the multipliers, shape (len, 2 n).")
+    arclength: Array = _over_points("arclength", "Distance along the branch in scaled arclength, shape (len,).")
+    truncation: Array = _over_points(
+        "orbit.truncation", "Estimated size of the neglected harmonics relative to the motion, shape (len,)."
+    )
+    harmonics: np.ndarray = _over_points(
+        "orbit.basis.harmonics", "Highest multiple of the base frequency used at each point, shape (len,), int."
+    )
 
     def parameter(self, name: str) -> Array:
         """Values of omega or a parameter along the branch, shape (len,).
@@ -183,34 +200,9 @@ class Branch(CurveTables, BranchReadings):
         return f"{unstable} unstable" + (f", {rest} not settled" if rest else "")
 
     @cached_property
-    def multipliers(self) -> ComplexArray:
-        """Floquet multipliers over the response period, by descending modulus, shape (len, 2 n)."""
-        return np.array([p.floquet.multipliers for p in self.points])
-
-    @cached_property
-    def multiplier_errors(self) -> Array:
-        """Estimated errors of the multipliers, shape (len, 2 n)."""
-        return np.array([p.floquet.errors for p in self.points])
-
-    @cached_property
     def stability_methods(self) -> list[str]:
         """Where each point's multipliers come from, in words."""
         return [p.floquet.method for p in self.points]
-
-    @cached_property
-    def arclength(self) -> Array:
-        """Distance along the branch in scaled arclength, shape (len,)."""
-        return np.array([p.arclength for p in self.points])
-
-    @cached_property
-    def truncation(self) -> Array:
-        """Estimated size of the neglected harmonics relative to the motion, shape (len,)."""
-        return np.array([p.orbit.truncation for p in self.points])
-
-    @cached_property
-    def harmonics(self) -> np.ndarray:
-        """Highest multiple of the base frequency used at each point, shape (len,), int."""
-        return np.array([p.orbit.basis.harmonics for p in self.points])
 
     @cached_property
     def kept(self) -> np.ndarray:

@@ -285,14 +285,10 @@ def _met(name: str, items: list[Bifurcation]) -> str:
     kinds = dict.fromkeys(item.kind for item in items)
     parts = []
     for kind in kinds:
-        places = [_place(name, item) for item in items if item.kind == kind]
+        met = [(f"{i.parameter(name):.6g}", _SHORT.get(i.criticality or "", "")) for i in items if i.kind == kind]
+        places = [place + (f"{_JOINED}({sense})" if sense else "") for place, sense in met]
         parts.append(f"{kind}{_JOINED}" + ", ".join(places))
     return "; ".join(parts)
-
-
-def _place(name: str, item: Bifurcation) -> str:
-    sense = _SHORT.get(item.criticality or "", "")
-    return f"{item.parameter(name):.6g}" + (f"{_JOINED}({sense})" if sense else "")
 
 
 def _wrapped(text: str, first: str, rest: str, width: int) -> list[str]:
