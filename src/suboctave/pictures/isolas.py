@@ -6,7 +6,7 @@ where in the plane of two design parameters isolas exist.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
@@ -76,21 +76,20 @@ def shade(
 def with_ends(dataset: xarray.Dataset, heads: Sequence[xarray.Dataset]) -> xarray.Dataset:
     """The dataset of a curve, the ends of isolas among its events under kinds of their own."""
     kinds = dataset["event_kind"].to_numpy().astype(object)
-    for kind, parameter, omega, value in _ends(heads):
+    ends = [
+        (kind, parameter_of(head), float(omega), float(value))
+        for head in heads
+        for kind, name in ((CENTRE, "born"), (MERGING, "merges"))
+        for omega, value in zip(head[f"{name}_omega"].to_numpy(), head[name].to_numpy(), strict=True)
+        if np.isfinite(value)
+    ]
+    for kind, parameter, omega, value in ends:
         if parameter not in dataset["parameter"].to_numpy():
             continue
         there, at = dataset["event_omega"].to_numpy(), coordinate(dataset, parameter)[1]
         same = (np.abs(there - omega) <= _SAME * abs(omega)) & (np.abs(at - value) <= _SAME * max(abs(value), 1e-300))
         kinds[same] = kind
     return dataset.assign(event_kind=("event", kinds))
-
-
-def _ends(heads: Sequence[xarray.Dataset]) -> Iterator[tuple[str, str, float, float]]:
-    for head in heads:
-        for kind, name in ((CENTRE, "born"), (MERGING, "merges")):
-            for value, omega in zip(head[name].to_numpy(), head[f"{name}_omega"].to_numpy(), strict=True):
-                if np.isfinite(value):
-                    yield kind, parameter_of(head), float(omega), float(value)
 
 
 def end_text(kind: str, value: float | None) -> str:

@@ -100,7 +100,11 @@ def plot_history(motions: Any, path: str | Path | None = None, **options: Unpack
     """
     drawn = MotionDrawing(motions, path, options, [*DERIVATIVES, "force"], _HISTORY, stacked=True)
     datasets, view = drawn.datasets, drawn.view
-    units = [_unit_of_time(dataset, view) for dataset in datasets]
+    # what t is multiplied by on the axis
+    units = [
+        1.0 if view.frequency else view.omega_reference or float(dataset.attrs["omega"]) / (2.0 * math.pi)
+        for dataset in datasets
+    ]
     longest = max(float(data["time"].to_numpy()[-1]) * unit for data, unit in zip(datasets, units, strict=True))
     for index in drawn.lower_first:
         data, unit = datasets[index], units[index]
@@ -129,13 +133,6 @@ def _values(dataset: xarray.Dataset, view: MotionView) -> np.ndarray:
         row = list(dataset["element"].to_numpy()).index(view.element)
         return np.asarray(dataset["force"].to_numpy()[row] * view.factor())
     return np.asarray(dataset[view.quantity].to_numpy() * view.factor(DERIVATIVES[view.quantity]))
-
-
-def _unit_of_time(dataset: xarray.Dataset, view: MotionView) -> float:
-    """What t is multiplied by on the axis."""
-    if view.frequency is not None:
-        return 1.0
-    return view.omega_reference or float(dataset.attrs["omega"]) / (2.0 * math.pi)
 
 
 class MotionDrawing:

@@ -172,8 +172,10 @@ def _section(name: str, datasets: Mapping[str, xarray.Dataset], item: Any) -> Se
     curves = {label: dataset for label, dataset in datasets.items() if not is_isolas(dataset)}
     if head is not None:
         return _isolas(name, head, curves)
-    if list(curves) != [""]:
-        return _diagram(name, curves, item)
+    if list(curves) != [""]:  # all curves in one figure, the tree, and each branch by itself
+        figure = _responses(curves, getattr(item, "legend", None))
+        each = [_curve(label, data, f"{name}, branch {label}") for label, data in curves.items()]
+        return Section(name, figures=[figure], tree=str(item), curves=each)
     (dataset,) = curves.values()
     if _has_points(dataset):
         return Section(name, curves=[_curve(name, dataset)])
@@ -181,13 +183,6 @@ def _section(name: str, datasets: Mapping[str, xarray.Dataset], item: Any) -> Se
         return Section(name, before=["a curve without points"])
     heading = str(dataset.attrs.get("title", ""))
     return Section(name, before=[heading] if heading else [], table=columns_of(dataset))
-
-
-def _diagram(name: str, curves: Mapping[str, xarray.Dataset], item: Any) -> Section:
-    """All curves in one figure, the tree, and each branch by itself."""
-    figure = _responses(curves, getattr(item, "legend", None))
-    each = [_curve(label, data, f"{name}, branch {label}") for label, data in curves.items()]
-    return Section(name, figures=[figure], tree=str(item), curves=each)
 
 
 def _isolas(name: str, head: xarray.Dataset, curves: Mapping[str, xarray.Dataset]) -> Section:

@@ -220,7 +220,10 @@ def space_axes(group: Sequence[xarray.Dataset], x: str | None = None, y: str | N
     """What is drawn to the right and into the depth; InputError where that must be given, or is not there."""
     pairs = {plane_of(dataset) for dataset in group if is_boundary(dataset)}
     if not pairs and (x is None or y is None):
-        free, names = {str(dataset.attrs["free"]) for dataset in group}, _differing(group)
+        # parameters that are constant on each curve, or vary, and are not the same on all
+        free, every = {str(dataset.attrs["free"]) for dataset in group}, group[0]["parameter"].to_numpy().astype(str)
+        values = {n: np.concatenate([coordinate(data, n)[0] for data in group]) for n in every if n not in free}
+        names = [name for name, value in values.items() if np.ptp(value) > 0.0]
         if len(free) == 1 and len(names) == 1:
             pairs = {(next(iter(free)), names[0])}
         elif x is None and y is not None:
@@ -230,11 +233,3 @@ def space_axes(group: Sequence[xarray.Dataset], x: str | None = None, y: str | N
                 f"name the parameter into the depth with y=; the curves differ in {', '.join(names) or 'none'}"
             )
     return chosen_axes(group, pairs, x, y, f"is neither of {', '.join(next(iter(pairs), ()))}")
-
-
-def _differing(group: Sequence[xarray.Dataset]) -> list[str]:
-    """Parameters that are constant on each curve, or vary, and are not the same on all."""
-    names = [str(name) for name in group[0]["parameter"].to_numpy()]
-    free = {str(dataset.attrs["free"]) for dataset in group}
-    values = {name: np.concatenate([coordinate(data, name)[0] for data in group]) for name in names if name not in free}
-    return [name for name, value in values.items() if np.ptp(value) > 0.0]

@@ -63,8 +63,8 @@ class SweepPath:
 
     def amplitude_at(self, value: float) -> float:
         """Amplitude of the path at a value of the free parameter, interpolated; nan where it does not get."""
-        v = self.values if self.direction == "up" else self.values[::-1]
-        a = self.amplitude if self.direction == "up" else self.amplitude[::-1]
+        sense = 1 if self.direction == "up" else -1
+        v, a = self.values[::sense], self.amplitude[::sense]
         return float(np.interp(value, v, a, left=np.nan, right=np.nan)) if len(v) else float("nan")
 
     def __repr__(self) -> str:
@@ -87,6 +87,10 @@ class _Run:
     last: int
     sense: float
 
+    def ends(self, sign: float) -> tuple[int, int]:
+        """Where a sweep of this sign enters and leaves it."""
+        return (self.first, self.last) if self.sense == sign else (self.last, self.first)
+
 
 def sweep_path(dataset: xarray.Dataset, direction: str = "up") -> SweepPath:
     """The path that a sweep of the free parameter, "up" or "down", follows along a branch; see the top of the module.
@@ -106,14 +110,14 @@ def sweep_path(dataset: xarray.Dataset, direction: str = "up") -> SweepPath:
     runs = _runs(whole)
     if not runs:
         return SweepPath(direction, name, np.zeros(0), np.zeros(0), (), "no motion of the branch is stable", False)
-    begin = min(runs, key=lambda run: (sign * whole.x[_ends(run, sign)[0]], whole.y[_ends(run, sign)[0]]))
-    at, run = _ends(begin, sign)[0], begin
+    run = min(runs, key=lambda run: (sign * whole.x[run.ends(sign)[0]], whole.y[run.ends(sign)[0]]))
+    at = run.ends(sign)[0]
     values: list[float] = []
     amplitudes: list[float] = []
     jumps: list[Jump] = []
     limit = (whole.x * sign).max()
     while True:
-        end = _ends(run, sign)[1]
+        end = run.ends(sign)[1]
         step = 1 if end >= at else -1
         walked = np.arange(at, end + step, step)
         values += whole.x[walked].tolist()
@@ -137,7 +141,7 @@ def sweep_path(dataset: xarray.Dataset, direction: str = "up") -> SweepPath:
         amplitudes.append(landed)
         inside = np.arange(run.first, run.last + 1)
         ahead = inside[sign * whole.x[inside] > sign * here]
-        at = int(ahead[np.argmin(sign * whole.x[ahead])]) if ahead.size else _ends(run, sign)[1]
+        at = int(ahead[np.argmin(sign * whole.x[ahead])]) if ahead.size else run.ends(sign)[1]
     return SweepPath(direction, name, np.array(values), np.array(amplitudes), tuple(jumps), why, bool(complete))
 
 
@@ -179,11 +183,6 @@ def _runs(whole: Line) -> list[_Run]:
     return runs
 
 
-def _ends(run: _Run, sign: float) -> tuple[int, int]:
-    """Where a sweep of this sign enters and leaves a run."""
-    return (run.first, run.last) if run.sense == sign else (run.last, run.first)
-
-
 def _what_ends(dataset: xarray.Dataset, whole: Line, run: _Run, end: int, step: int) -> tuple[str, bool]:
     """Why a run ends: the kind of fold and True where a sweep jumps, else words and False."""
     name, here = str(dataset.attrs["free"]), float(whole.x[end])
@@ -209,23 +208,18 @@ def _what_ends(dataset: xarray.Dataset, whole: Line, run: _Run, end: int, step: 
 
 def _landings(whole: Line, runs: list[_Run], left: _Run, here: float, sign: float) -> list[tuple[_Run, float]]:
     """Stable runs other than the one just left that a sweep can go on with from this value, and their amplitudes."""
+    from scipy.interpolate import PchipInterpolator
+
     places = []
     for run in runs:
         if run is left:
             continue
-        enters, leaves = _ends(run, sign)
+        enters, leaves = run.ends(sign)
         # one that begins or ends right here is the same fold, or does not go on
         if not sign * whole.x[enters] < sign * here < sign * whole.x[leaves]:
             continue
-        inside = slice(run.first, run.last + 1)
-        places.append((run, _interpolated(whole.x[inside], whole.y[inside], here)))
+        x, first = np.unique(whole.x[run.first : run.last + 1], return_index=True)
+        y = whole.y[run.first : run.last + 1][first]
+        amplitude = PchipInterpolator(x, y)(here) if len(x) > 2 else np.interp(here, x, y)  # monotone
+        places.append((run, float(amplitude)))
     return places
-
-
-def _interpolated(x: Array, y: Array, at: float) -> float:
-    """Monotone cubic interpolation; x ascending or descending."""
-    from scipy.interpolate import PchipInterpolator
-
-    x, first = np.unique(x, return_index=True)
-    y = y[first]
-    return float(PchipInterpolator(x, y)(at)) if len(x) > 2 else float(np.interp(at, x, y))

@@ -155,7 +155,12 @@ def motion_dataset(
     wanted = [check_element(system, index) for index in elements]
     force = [force_along(state, index)(tau) for index in wanted]
     variables["force"] = (("element", "sample"), np.reshape(force, (len(wanted), count + 1)))
-    gaps = list(_gaps(orbit, chosen))
+    gaps = []
+    for index, (element, law) in enumerate(zip(system.elements, orbit.balance.laws(orbit.values).members, strict=True)):
+        places = levels(law.kind, law.coefficients)
+        direction = np.asarray(reads(element, system.n), dtype=float) if places else np.zeros(system.n)
+        if direction[chosen] and np.count_nonzero(direction) == 1:
+            gaps += [(level / direction[chosen], index) for level in places]
     variables["gap_level"] = ("gap", np.array([level for level, _ in gaps], dtype=float))
     variables["gap_element"] = ("gap", np.array([index for _, index in gaps], dtype=int))
     variables["parameters"] = ("parameter", np.array([orbit.values[name] for name in system.parameters], dtype=float))
@@ -186,16 +191,3 @@ def motion_dataset(
         "error": float(orbit.truncation),
     }
     return xarray.Dataset(variables, coords, attributes)
-
-
-def _gaps(orbit: PeriodicOrbit, dof: int) -> Iterator[tuple[float, int]]:
-    """Gaps as values of x of one degree of freedom, with the index of their element."""
-    system = orbit.balance.system
-    laws = orbit.balance.laws(orbit.values).members
-    for index, element in enumerate(system.elements):
-        places = levels(laws[index].kind, laws[index].coefficients)
-        if not places:
-            continue
-        direction = np.asarray(reads(element, system.n), dtype=float)
-        if direction[dof] and np.count_nonzero(direction) == 1:
-            yield from ((level / direction[dof], index) for level in places)
