@@ -150,30 +150,25 @@ class Isola:
         low, high = self.range
         if not is_number(value) or not low <= value <= high:
             raise InputError(f"this isola exists for {self.parameter} from {low:.9g} to {high:.9g}, not at {value!r}")
-        known = self.followed.get(float(value))
-        if known is None:
-            known = self._followed(float(value), progress)
-            if not known.interrupted:
-                self.followed[float(value)] = known
-        return known
-
-    def stable_ranges(self, value: float) -> list[tuple[float, float]]:
-        """Between which frequencies there are stable motions on the closed branch at a value; pairs of omega."""
-        return stable_ranges(self.at(value))
-
-    def _followed(self, value: float, progress: Any) -> Branch:
+        if value in self.followed:
+            return self.followed[float(value)]
         why = ""
-        for piece in self.pieces:
-            if not piece.contains(value):
-                continue
+        for piece in (piece for piece in self.pieces if piece.contains(value)):
             try:
-                item = piece.solve_at(value)
+                item = piece.solve_at(float(value))
             except ConvergenceError as failure:
                 why = f" ({failure})"
                 continue
             options: SearchOptions = {**self.options, "progress": progress}
-            return branch_through(item, SearchRange(*self.omega), self.parameter, self.pieces, options)
+            branch = branch_through(item, SearchRange(*self.omega), self.parameter, self.pieces, options)
+            if not branch.interrupted:
+                self.followed[float(value)] = branch
+            return branch
         raise ConvergenceError(f"no limit point of the isola was found at {self.parameter} = {value:.9g}{why}")
+
+    def stable_ranges(self, value: float) -> list[tuple[float, float]]:
+        """Between which frequencies there are stable motions on the closed branch at a value; pairs of omega."""
+        return stable_ranges(self.at(value))
 
     def plot(self, path: Any = None, values: int | Sequence[float] = 5, responses: Any = (), **options: Any) -> Any:
         """Draw it in space: the surface of its closed branches, its limit points, its birth.

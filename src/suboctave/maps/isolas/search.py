@@ -59,7 +59,8 @@ class Search:
         self.values = tuple(values)
         self.met: dict[float, list[Branch]] = {}
         self.isolas: list[Isola] = []
-        self._explained: set[tuple[float, int]] = set()
+        #: limit points, by value and piece, that lie on a branch that is not detached
+        self._explained: set[tuple[float, MonotonePiece]] = set()
 
     @property
     def few(self) -> list[float]:
@@ -107,33 +108,23 @@ class Search:
         """
         name, bounds = self.catalogue.name, self.catalogue.bounds
         done: set[int] = set()
-        while True:
-            centre = next((c for c in self._centres() if id(c[1]) not in done), None)
-            if centre is None:
-                break
-            piece, event, upper = centre
-            done.add(id(event))
-            if any(end is not None and end.orbit is event.orbit for isola in self.isolas for end in isola.ends):
-                continue
-            value = event.parameter(name)
-            beyond, _ = next(self.critical(piece.nu, value, not upper), (bounds[0 if upper else 1], []))
-            yield piece, 0.5 * (value + beyond)
+        for piece in self.catalogue.pieces:
+            for upper in (False, True):
+                event = piece.end(upper) if piece.kind == "LP" else None
+                # where a contact grazes, the quadratic form says nothing
+                if event is None or event.kind != "extremum" or event.isola == "isola_merging" or id(event) in done:
+                    continue
+                done.add(id(event))
+                if any(end is not None and end.orbit is event.orbit for isola in self.isolas for end in isola.ends):
+                    continue
+                value = event.parameter(name)
+                beyond, _ = next(self.critical(piece.nu, value, not upper), (bounds[0 if upper else 1], []))
+                yield piece, 0.5 * (value + beyond)
         for value in values:
             for piece in self.catalogue.limit_points:
-                unexplained = piece.contains(value) and not self.explained(piece, value)
+                unexplained = piece.contains(value) and (value, piece) not in self._explained
                 if unexplained and not any(_covers(isola, piece, value) for isola in self.isolas):
                     yield piece, value
-
-    def _centres(self) -> Iterator[tuple[MonotonePiece, TrackedEvent, bool]]:
-        """Ends of pieces at which a closed branch may shrink to a point, and whether it exists below.
-
-        Where a contact grazes, the quadratic form says nothing.
-        """
-        for piece in self.catalogue.limit_points:
-            for upper in (False, True):
-                event = piece.end(upper)
-                if event is not None and event.kind == "extremum" and event.isola != "isola_merging":
-                    yield piece, event, upper
 
     # ------------------------------------------------------------------------------------- branches at one value
     def through(self, piece: MonotonePiece, value: float) -> Loop | None:
@@ -155,7 +146,7 @@ class Search:
         carrier = self.catalogue.carrier(branch, value, self.met.get(value, ()))
         if carrier is None or carrier is branch:
             return Loop(value, branch, self.pieces_on(branch, value, *known), carrier is branch)
-        self._explained |= {(value, id(piece)) for piece in known}
+        self._explained |= {(value, piece) for piece in known}
         return Loop(value, carrier, self.pieces_on(carrier, value), True)
 
     def pieces_on(self, branch: Branch, value: float, *known: MonotonePiece) -> tuple[MonotonePiece, ...]:
@@ -167,11 +158,7 @@ class Search:
         """A branch that is not detached: its limit points at that value are explained."""
         if not loop.detached:
             self.met.setdefault(loop.value, []).append(loop.branch)
-            self._explained |= {(loop.value, id(piece)) for piece in loop.pieces}
-
-    def explained(self, piece: MonotonePiece, value: float) -> bool:
-        """Whether a limit point at a value lies on a branch that is not detached."""
-        return (value, id(piece)) in self._explained
+            self._explained |= {(loop.value, piece) for piece in loop.pieces}
 
     def critical(self, nu: int, value: float, upper: bool) -> Iterator[tuple[float, list[TrackedEvent]]]:
         """Values ahead at which branches of motions of `nu` load periods may change, with what happens there."""

@@ -141,30 +141,19 @@ def checked_levels(levels: Any) -> tuple[float, ...] | None:
 
 def _result(search: Search) -> Isolas:
     """The isolas of a search, and the curves that were followed, with the outcome in one sentence."""
-    catalogue = search.catalogue
+    catalogue, isolas = search.catalogue, search.isolas
     (low, high), (first, last) = catalogue.bounds, catalogue.omega
-    isolas = search.isolas
-    curves = {kind: [curve for curve in catalogue.curves if curve.kind == kind] for kind in ("LP", "PD")}
+    limit_points, doublings = ([c for c in catalogue.curves if c.kind == kind] for kind in ("LP", "PD"))
     where = f"for {catalogue.name} from {low:g} to {high:g}, omega from {first:g} to {last:g}"
-    begin = f"the responses at {len(search.values)} values of {catalogue.name}"
-    followed = f"{len(curves['LP'])} curves of limit points from {begin}"
+    begun = f"the responses at {len(search.values)} values of {catalogue.name}"
+    followed = f"{len(limit_points)} curves of limit points from {begun}"
     if isolas:
         summary = f"{len(isolas)} isola{'s' * (len(isolas) > 1)} {where}; {followed}."
     else:
         periods = " and ".join(period_name(nu) for nu in sorted({p.nu for p in catalogue.limit_points} | {1}))
         summary = f"No isola of {periods} motions was found {where}: {followed} show none."
-    return Isolas(
-        isolas,
-        catalogue.system,
-        catalogue.name,
-        catalogue.bounds,
-        (first, last),
-        curves["LP"],
-        curves["PD"],
-        catalogue.notes,
-        summary,
-        catalogue.interruption,
-    )
+    asked = catalogue.system, catalogue.name, catalogue.bounds, (first, last)
+    return Isolas(isolas, *asked, limit_points, doublings, catalogue.notes, summary, catalogue.interruption)
 
 
 #: levels of the loads, and periods of motions, that are tried where nothing else leads to an isola

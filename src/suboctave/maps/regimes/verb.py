@@ -133,16 +133,14 @@ def _checked_isolas(isolas: Any, parameter: str) -> Sequence[TrackedBranch]:
 
 
 def _checked_motions(motions: Any, catalogue: Catalogue) -> list[PeriodicOrbit]:
-    system, name = catalogue.system, catalogue.name
-    bounds, omega = catalogue.bounds, catalogue.omega
+    system, name, (low, high) = catalogue.system, catalogue.name, catalogue.bounds
     given = list(motions) if isinstance(motions, Sequence) else [motions]
     for orbit in given:
         if not isinstance(orbit, PeriodicOrbit):
             raise InputError(f"motions must be PeriodicOrbit objects, not {type(orbit).__name__}")
         if set(orbit.values) != set(system.parameters):
             raise InputError(f"the motion {orbit!r} is one of another system")
-        inside = bounds[0] <= orbit.values[name] <= bounds[1] and omega[0] <= orbit.omega <= omega[1]
-        if not inside:
+        if not (low <= orbit.values[name] <= high and catalogue.omega.low <= orbit.omega <= catalogue.omega.high):
             raise InputError(f"the motion {orbit!r} does not lie in the plane of the map")
         others = [n for n, v in system.parameters.items() if n != name and orbit.values[n] != v]
         if others:
@@ -183,24 +181,21 @@ class _Survey:
 
     def fill(self, values: Sequence[float]) -> None:
         """Add slices until every strip has one, and no limit point known is unexplained at any of them."""
-        catalogue = self.catalogue
-        waiting = list(values)
-        for value in dict.fromkeys((waiting[0], waiting[-1])):
+        catalogue, waiting = self.catalogue, list(values)
+        for value in dict.fromkeys((values[0], values[-1])):
             follow_curves_beside(value, catalogue)
         while waiting:
-            value = waiting.pop(0)
-            if len(self.slices) >= self.most:
-                catalogue.note(
-                    f"max_slices={self.most} values of {catalogue.name} were looked at: narrow strips were not"
-                )
-                break
-            share = len(self.slices) / (len(self.slices) + len(waiting) + 4.0)
-            catalogue.progress(share, f"{catalogue.name} = {value:.6g}")
-            new = Slice(value, catalogue, self.longest)
-            new.complete()
-            self.slices.append(new)
-            if waiting:
-                continue
+            for number, value in enumerate(waiting):
+                if len(self.slices) >= self.most:
+                    catalogue.note(
+                        f"max_slices={self.most} values of {catalogue.name} were looked at: narrow strips were not"
+                    )
+                    return
+                share = len(self.slices) / (len(self.slices) + len(waiting) - number + 3.0)
+                catalogue.progress(share, f"{catalogue.name} = {value:.6g}")
+                new = Slice(value, catalogue, self.longest)
+                new.complete()
+                self.slices.append(new)
             # limit points that have become known later may lie on branches that were not met before
             count = -1
             while count != len(catalogue.curves):
@@ -217,7 +212,7 @@ class _Survey:
         """
         catalogue = self.catalogue
         name, (low, high) = catalogue.name, catalogue.bounds
-        marks = [low, high]
+        marks = [high]
         for curve in catalogue.curves:
             for event in curve.bifurcations.met:
                 if isinstance(event, TrackedEvent) and (event.kind != "extremum" or event.parameter_name == name):
@@ -233,9 +228,9 @@ class _Survey:
         for piece in catalogue.pieces:
             for end in catalogue.omega:
                 marks += piece.values_at(end)
-        distinct: list[float] = []
+        distinct = [low]
         for value in sorted(v for v in marks if low <= v <= high):
-            if not distinct or value - distinct[-1] > _TOGETHER * catalogue.span:
+            if value - distinct[-1] > _TOGETHER * catalogue.span:
                 distinct.append(value)
         return distinct
 
