@@ -14,7 +14,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from suboctave.errors import path_of, suggest
+from suboctave.errors import Key, path_of, suggest
 from suboctave.model.system import System, describe
 from suboctave.study.figures import FIGURES, Figure, StudyCurves
 from suboctave.study.mistakes import Lines, Mistake, Mistakes, StudyError
@@ -101,21 +101,12 @@ def read_study(path: str | Path, allow_code: bool = False) -> Study:
     text = _text(source)
     content = _parsed(source, text)
     mistakes = Mistakes(str(source), Lines(text))
-    sections = _validated(StudyFile, content, (), mistakes)
-    if sections is None:
-        # the sections that are there are still looked at, so that all mistakes are told at once
-        kept = {k: v for k, v in content.items() if k in StudyFile.model_fields and _fits(k, v)}
-        sections = StudyFile.model_construct(
-            **{"title": "", "seconds": None, "system": None, "analyses": [], "outputs": {}} | kept
-        )
+    sections = _validated(StudyFile, content, (), mistakes, rest=True)
     system = None
-    if isinstance(sections.system, dict):
-        section = _validated(SystemSection, sections.system, ("system",), mistakes)
-        if section is None:
-            section = _what_is_left(sections.system)
-        if section is not None:
-            system = make_system(section, source.parent, mistakes, allow_code)
-    steps = _steps(sections.analyses, system, mistakes, allow_code)
+    if "system" in sections.model_fields_set:
+        section = _validated(SystemSection, sections.system, ("system",), mistakes, rest=True)
+        system = make_system(section, source.parent, mistakes, allow_code)
+    steps = _steps(getattr(sections, "analyses", []), system, mistakes, allow_code)
     outputs = _outputs(sections.outputs, steps, system, mistakes)
     mistakes.refuse()
     assert system is not None
@@ -123,35 +114,6 @@ def read_study(path: str | Path, allow_code: bool = False) -> Study:
     return Study(
         source, text, sections.title, system, tuple(s for s in steps if s), outputs, allow_code, sections.seconds
     )
-
-
-def _what_is_left(given: Mapping[str, Any]) -> SystemSection | None:
-    """The [system] without what is wrong in it, so that the rest is looked at as well; None where that cannot be."""
-    kept = {name: value for name, value in given.items() if name in SystemSection.model_fields}
-    try:
-        return SystemSection.model_validate(kept)
-    except ValidationError as error:
-        for item in error.errors(include_url=False):
-            place = item["loc"]
-            if place[0] == "parameters" and len(place) > 1 and isinstance(kept["parameters"], dict):
-                # it exists: expressions that name it are right
-                kept["parameters"] = {**kept["parameters"], str(place[1]): 1.0}
-            else:
-                kept.pop(str(place[0]), None)
-    try:
-        return SystemSection.model_validate(kept)
-    except ValidationError:
-        return None
-
-
-def _fits(key: str, value: Any) -> bool:
-    if key == "analyses":
-        return _is_tables(value)
-    return key != "seconds" and isinstance(value, str if key == "title" else dict)
-
-
-def _is_tables(value: Any) -> bool:
-    return isinstance(value, list) and all(isinstance(item, dict) for item in value)
 
 
 def _refused(source: Path, message: str, line: int = 0) -> StudyError:
@@ -191,12 +153,22 @@ def _parsed(source: Path, text: str) -> dict[str, Any]:
     raise _refused(source, f"this is not TOML: {reason}", line)
 
 
-def _validated(model: type[Any], given: Mapping[str, Any], prefix: tuple[str | int, ...], mistakes: Mistakes) -> Any:
+def _validated(model: Any, given: Mapping[str, Any], prefix: Key, mistakes: Mistakes, rest: bool = False) -> Any:
+    """A table as a `model`. What is wrong in it is noted; then None, or with `rest` what is in order by itself is
+    given, so that all mistakes are told at once.
+    """
     try:
         return model.model_validate(given)
     except ValidationError as error:
         mistakes.add_validation(prefix, error, model)
-    return None
+        wrong = [item["loc"] for item in error.errors(include_url=False)]
+    if not rest:
+        return None
+    kept = {name: value for name, value in given.items() if not any(place[0] == name for place in wrong)}
+    if isinstance(values := given.get("parameters"), dict):
+        # a parameter whose value is wrong exists: expressions that name it are right
+        kept["parameters"] = {**values, **{place[1]: 1.0 for place in wrong if place[0] == "parameters" and place[1:]}}
+    return model.model_construct(**kept)
 
 
 def _steps(
@@ -247,7 +219,7 @@ def _outputs(
     plain = dict(given)
     figures = plain.pop("figures", [])
     sections: list[Figure] = []
-    if not _is_tables(figures):
+    if not isinstance(figures, list) or not all(isinstance(item, dict) for item in figures):
         mistakes.add(("outputs", "figures"), "are tables: [[outputs.figures]], each with a file")
         figures = []
     for index, item in enumerate(figures):
