@@ -105,6 +105,7 @@ Range = Annotated[list[float], Field(min_length=2, max_length=2)]
 Verb = Callable[..., Any]
 #: what comes of a step
 Gives = Literal["branch", "diagram", "isolas", "table"]
+_WORDS: dict[Gives, str] = {"branch": "one branch", "diagram": "a diagram", "isolas": "isolas", "table": "a table"}
 #: what a check reports: the key inside the table, and what to change
 Complaint = tuple[Key, str]
 
@@ -268,31 +269,22 @@ class Curve(BaseModel):
             yield key, f"there is no analysis {name!r} before this one{suggest(name, around.before)}"
             return
         gives = around.before[name].gives
-        given = [choice for choice in ("branch", "label", "isola", "at") if getattr(self, choice) is not None]
-        wrong, why = ("isola", "at"), "looks for no isolas"
-        if gives == "isolas":
-            wrong, why = ("branch", "label"), "gives isolas, not a diagram"
-        for choice in given:
-            if choice in wrong:
-                yield (*place, choice), f"the analysis {name!r} {why}: leave {choice} out"
-        own = [choice for choice in given if choice not in wrong]
-        if gives == "isolas":
-            if self.isola is None:
-                text = "say which, and at which value"
-                example = f'{{ analysis = "{name}", isola = 0, at = 0.3 }}; without at is its curve of limit points'
-                yield key, f"the analysis {name!r} gives isolas: {text}, {example}"
-            elif self.at is not None and getattr(self, "bifurcation", None) in _ENDS:
-                yield (*place, "at"), "an end of an isola has a value of its own: leave at out"
-        elif gives == "diagram":
-            if len(own) == 2:
-                yield key, "choose a branch of the diagram by its number or by its label, not by both"
-            elif not own:
-                example = f'{{ analysis = "{name}", branch = 0 }} (the response) or label = "2T"'
-                yield key, f"the analysis {name!r} gives a diagram: say which of its branches, {example}"
-        elif gives != "branch":
+        for choice, of in (("branch", "diagram"), ("label", "diagram"), ("isola", "isolas"), ("at", "isolas")):
+            if getattr(self, choice) is not None and of != gives:
+                what = "looks for no isolas" if of == "isolas" else f"gives {_WORDS[gives]}, not a diagram"
+                yield (*place, choice), f"the analysis {name!r} {what}: leave {choice} out"
+        if gives == "table":
             yield key, f"the analysis {name!r} gives no branch to start from"
-        elif own:
-            yield (*place, own[0]), f"the analysis {name!r} gives one branch, not a diagram: leave {own[0]} out"
+        elif gives == "isolas" and self.isola is None:
+            example = f'{{ analysis = "{name}", isola = 0, at = 0.3 }}; without at is its curve of limit points'
+            yield key, f"the analysis {name!r} gives isolas: say which, and at which value, {example}"
+        elif gives == "isolas" and self.at is not None and getattr(self, "bifurcation", None) in _ENDS:
+            yield (*place, "at"), "an end of an isola has a value of its own: leave at out"
+        elif gives == "diagram" and self.branch is not None and self.label is not None:
+            yield key, "choose a branch of the diagram by its number or by its label, not by both"
+        elif gives == "diagram" and self.branch is None and self.label is None:
+            example = f'{{ analysis = "{name}", branch = 0 }} (the response) or label = "2T"'
+            yield key, f"the analysis {name!r} gives a diagram: say which of its branches, {example}"
 
     def of(self, results: Mapping[str, Result]) -> Branch:
         """The branch that the analysis gave, or one of a diagram or of an isola; InputError where there is none."""
