@@ -428,7 +428,7 @@ def test_notes_of_searches_under_other_loads_are_kept(monkeypatch):
         ({"parameter": "k"}, "parameter"),
         ({"parameter": "omega"}, "omega varies anyway"),
         ({"values": 1}, "at least 2"),
-        ({"values": [0.5, 1.5]}, "numbers from 0 to 1, not"),
+        ({"values": [0.5, 1.5]}, "from 0 to 1, not"),
         ({"search": (0,)}, "periods"),
         ({"search": "2"}, "periods"),
         ({"levels": (0.0,)}, "levels"),

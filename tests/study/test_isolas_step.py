@@ -177,7 +177,7 @@ def test_resume_does_not_search_again(study_file, monkeypatch):
         ('parameter = "F"', 'parameter = "omega"', "is the design parameter, beside omega"),
         ("bounds = [0.1, 5.0]", "bounds = [5.0, 5.0]", "two different finite ends"),
         ("values = [5.0]", "values = 1", "must be at least 2"),
-        ("values = [5.0]", "values = [6.0]", "numbers from 0.1 to 5, not [6.0]"),
+        ("values = [5.0]", "values = [6.0]", "from 0.1 to 5, not [6.0]"),
         ("at = [4.0, 1.0]", "at = [4.0, 0.0]", "0 lies outside the bounds"),
         ("search = [3]", "search = [0]", "2 or more"),
         ("search = [3]", "levels = [-2.0]", "positive numbers"),

@@ -355,5 +355,8 @@ def checked_values(name: str, given: Any, bounds: tuple[float, float], least: in
         )
     values = listed(given)
     if len(values) < min(least, 1) or not all(is_number(value) and low <= value <= high for value in values):
-        raise InputError(f"{name} must be how many, or numbers from {low:.9g} to {high:.9g}, not {given!r}")
+        raise InputError(
+            f"{name} must be a number of values, or the values themselves, from {low:.9g} to {high:.9g}, "
+            f"not {shortened(given)}"
+        )
     return [float(value) for value in values]
