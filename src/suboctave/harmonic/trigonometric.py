@@ -21,15 +21,14 @@ _STRETCH = 256
 
 
 @kernel(fastmath=FAST)
-def displacement(c, zr, zi, out):
-    """`Re sum_k c_k z^k` and its first derivatives by tau at the points z, into the rows of `out` (D, N)."""
-    factors, imaginary = c.copy(), np.empty(_STRETCH)
-    top = c.shape[0] - 1
-    for order in range(out.shape[0]):
+def sum_waves(coefficients, zr, zi, real, imaginary):
+    """`sum_k coefficients[r, k] z^k` at the points z, real and imaginary part into arrays (R, N)."""
+    top = coefficients.shape[1] - 1
+    for r in range(coefficients.shape[0]):
+        factors = coefficients[r]
         for begin in range(0, zr.shape[0], _STRETCH):
             end = begin + _STRETCH
-            x, co, si = out[order, begin:end], zr[begin:end], zi[begin:end]
-            y = imaginary[: x.shape[0]]
+            x, y, co, si = real[r, begin:end], imaginary[r, begin:end], zr[begin:end], zi[begin:end]
             a, b = factors[top].real, factors[top].imag
             for j in range(x.shape[0]):
                 x[j] = a
@@ -43,11 +42,22 @@ def displacement(c, zr, zi, out):
                     x[j] = t * co[j] - u * si[j] + d
                     y[j] = t * si[j] + u * co[j] + e
             if top % 2 == 1:
-                a = factors[0].real
+                a, b = factors[0].real, factors[0].imag
                 for j in range(x.shape[0]):
-                    x[j] = x[j] * co[j] - y[j] * si[j] + a
-        for k in range(top + 1):
-            factors[k] = complex(-k * factors[k].imag, k * factors[k].real)
+                    t = x[j] * co[j] - y[j] * si[j] + a
+                    y[j] = x[j] * si[j] + y[j] * co[j] + b
+                    x[j] = t
+
+
+@kernel()
+def displacement(c, zr, zi, out):
+    """`Re sum_k c_k z^k` and its first derivatives by tau at the points z, into the rows of `out` (D, N)."""
+    factors = np.empty((out.shape[0], c.shape[0]), dtype=np.complex128)
+    for k in range(c.shape[0]):
+        factors[0, k] = c[k]
+        for order in range(1, out.shape[0]):
+            factors[order, k] = complex(-k * factors[order - 1, k].imag, k * factors[order - 1, k].real)
+    sum_waves(factors, zr, zi, out, np.empty(out.shape))
 
 
 def motion(c: ComplexArray, zr: Array, zi: Array) -> Array:
@@ -59,13 +69,9 @@ def motion(c: ComplexArray, zr: Array, zi: Array) -> Array:
 
 def wave_sums(coefficients: ComplexArray, zr: Array, zi: Array) -> ComplexArray:
     """`sum_k coefficients[r, k] z^k` at the points z; complex, shape (R, N)."""
-    sums = np.empty((len(coefficients), len(zr)), dtype=complex)
-    parts = np.empty((2, 1, len(zr)))
-    for c, out in zip(coefficients, sums, strict=True):
-        displacement(c, zr, zi, parts[0])
-        displacement(-1j * c, zr, zi, parts[1])
-        out.real, out.imag = parts[0], parts[1]
-    return sums
+    real, imaginary = np.empty((2, len(coefficients), len(zr)))
+    sum_waves(np.ascontiguousarray(coefficients), zr, zi, real, imaginary)
+    return real + 1j * imaginary
 
 
 @kernel(fastmath=FAST)

@@ -101,11 +101,9 @@ class GeneralLaw(LawAlong):
     def __init__(self, along: Along, members: Sequence[Member]) -> None:
         super().__init__(along, members)
         _, self.element, self.kind, self.c, _ = members[0]
-        self.laws = [as_coupled(member.element) for member in members]
-        self.law = self.laws[0]
         self.count = len(along.motions)
         self.moving = self.element.depends_on_velocity
-        self.harmonic = self.law.time_harmonic
+        self.harmonic = 0 if self.kind.whole else as_coupled(self.element).time_harmonic
 
     @property
     def samples(self) -> int:
@@ -131,10 +129,9 @@ class GeneralLaw(LawAlong):
     def state_at(self, zr: Array, zi: Array) -> tuple[Array, Array]:
         """q (Q', N) and theta (N,) at instants."""
         along = self.along
-        values = np.array([motion(one, zr, zi) for one in along.motions])
-        q = np.concatenate((values[:, 0], along.rate * values[:, 1])) if self.moving else values[:, 0]
-        theta = along.nu * np.arctan2(zi, zr) if self.harmonic else np.zeros_like(zr)
-        return np.ascontiguousarray(q), theta
+        values = [motion(one, zr, zi) for one in along.motions]
+        q = np.array([u for u, _ in values] + [along.rate * v for _, v in values if self.moving])
+        return q, along.nu * np.arctan2(zi, zr) if self.harmonic else np.zeros_like(zr)
 
     @lazy
     def nodes(self) -> Nodes:
@@ -202,8 +199,8 @@ class GeneralLaw(LawAlong):
     def tangent(self, q: Array, theta: Array) -> tuple[Array, Array]:
         """f (N,) and f_q (Q', N) at states."""
         force, slopes = np.zeros_like(theta), np.zeros_like(q)
-        for law, member in zip(self.laws, self.members, strict=True):
-            f, f_q = law.tangent(q, theta, member.coefficients)
+        for member in self.members:
+            f, f_q = as_coupled(member.element).tangent(q, theta, member.coefficients)
             if np.shape(f) != theta.shape or np.shape(f_q) != q.shape:
                 label = member.element.label
                 raise InputError(f"{label}: tangent must return arrays of shape {theta.shape} and {q.shape}")
@@ -213,19 +210,23 @@ class GeneralLaw(LawAlong):
 
     def curvature(self, q: Array, theta: Array) -> Array:
         """f_qq (Q', Q', N) at states, its regular part."""
-        total = np.zeros((len(q), *q.shape))
-        for law, member in zip(self.laws, self.members, strict=True):
-            whole, c = member.whole, member.coefficients
-            total += law.curvature(q, theta, c) if whole is None else whole.curvature(q[0], c)
-        return total
+        parts = [
+            as_coupled(m.element).curvature(q, theta, m.coefficients)
+            if m.whole is None
+            else m.whole.curvature(q[0], m.coefficients)[None, None]
+            for m in self.members
+        ]
+        return sum(parts[1:], parts[0])
 
     def third_derivative(self, q: Array, theta: Array) -> Array:
         """f_qqq (Q', Q', Q', N) at states, its regular part."""
-        total = np.zeros((len(q), len(q), *q.shape))
-        for law, member in zip(self.laws, self.members, strict=True):
-            whole, c = member.whole, member.coefficients
-            total += law.third(q, theta, c) if whole is None else whole.third(q[0], c)
-        return total
+        parts = [
+            as_coupled(m.element).third(q, theta, m.coefficients)
+            if m.whole is None
+            else m.whole.third(q[0], m.coefficients)[None, None, None]
+            for m in self.members
+        ]
+        return sum(parts[1:], parts[0])
 
     def add_spectra(self, out: ComplexArray) -> None:
         """See `LawAlong.add_spectra`."""

@@ -26,7 +26,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.model.elements.base import BaseElement
@@ -49,7 +49,7 @@ class Member(NamedTuple):
     @property
     def whole(self) -> WholeLaw | None:
         """The law, where its smoothness class is all of it."""
-        return self.kind if isinstance(self.kind, WholeLaw) and self.kind.whole else None
+        return cast("WholeLaw", self.kind) if self.kind.whole else None
 
 
 @dataclass(eq=False)
@@ -148,7 +148,7 @@ class LawAlong(ABC):
     @property
     def whole(self) -> bool:
         """Whether the smoothness classes of its elements are all of their laws."""
-        return all(member.whole is not None for member in self.members)
+        return all(member.kind.whole for member in self.members)
 
     @abstractmethod
     def add_spectra(self, out: ComplexArray) -> None:

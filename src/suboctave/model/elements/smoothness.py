@@ -158,6 +158,8 @@ class PiecewiseLinear:
 class AdaptiveSampling:
     """Nothing is known: samples are added until force and tangent stop moving."""
 
+    whole = False
+
 
 @dataclass(frozen=True)
 class CornerSampling:
@@ -171,6 +173,7 @@ class CornerSampling:
     points: tuple[float, ...] = ()
     velocities: tuple[float, ...] = ()
     rough: bool = False
+    whole = False
 
 
 @dataclass(frozen=True)
@@ -182,6 +185,7 @@ class SharpVelocitySampling:
 
     velocities: tuple[float, ...]
     widths: tuple[float, ...]
+    whole = False
 
     def __post_init__(self) -> None:
         if len(self.widths) != len(self.velocities):
