@@ -39,7 +39,7 @@ from suboctave.harmonic.quadrature import (
 )
 from suboctave.harmonic.trigonometric import crossings_of, extrema, motion, spectra
 from suboctave.lazy import lazy
-from suboctave.model.elements.coupled import as_coupled, changed_law
+from suboctave.model.elements.coupled import as_coupled
 from suboctave.model.elements.smoothness import (
     AdaptiveSampling,
     CornerSampling,
@@ -252,9 +252,10 @@ class GeneralLaw(LawAlong):
         q, theta = self.path
         total = np.zeros((1 + len(q), len(theta)))
         for member in changed:
-            f, f_q = changed_law(member.element, q, theta, member.coefficients, rates[member.number])
-            total[0] += f
-            total[1:] += f_q
+            rate, law = rates[member.number], as_coupled(member.element)
+            f_c, f_qc = law.coefficient_tangent(q, theta, member.coefficients)
+            total[0] += rate @ f_c
+            total[1:] += (rate @ f_qc.reshape(len(rate), -1)).reshape(q.shape)
         out[: len(total)] += self.project(total)
         for row, by, spectrum in self._moved_corners():
             out[1 + row] -= (rates[self.members[0].number] @ by) * spectrum

@@ -154,12 +154,6 @@ def _of_law(name: str) -> Any:
     return method
 
 
-def changed_law(element: BaseElement, q: Array, theta: Array, c: Array, rates: Array) -> tuple[Array, Array]:
-    """What a change of the coefficients, `rates` (nc,), does to f and f_q, (N,) and (Q, N)."""
-    f_c, f_qc = as_coupled(element).coefficient_tangent(q, theta, c)
-    return rates @ f_c, np.tensordot(rates, f_qc, 1)
-
-
 class Expression(CoupledElement):
     """A force given as text, with exact derivatives.
 
