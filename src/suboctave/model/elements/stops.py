@@ -65,6 +65,18 @@ def _arctan_steps(sides: tuple[int, ...], c: tuple[float, ...]) -> SharpSampling
     return SharpSampling(tuple(gaps), (1.0 / s,) * len(gaps), constant, 0.5 * k * len(gaps), steps)
 
 
+@lru_cache(maxsize=64)
+def _law_of(
+    sides: tuple[int, ...], names: tuple[str, ...], regularised: bool, owner: str
+) -> tuple[Law, list[int], list[int]]:
+    """The law as a text; where its coefficients, in alphabetical order, stand among `names`, and conversely."""
+    from suboctave.model.expressions.law import law_of
+
+    text = " + ".join(_text(side, gap, regularised) for side, gap in zip(sides, names[1:], strict=False))
+    order = np.argsort(names)
+    return law_of(text, ("x",), False, owner), order.tolist(), np.argsort(order).tolist()
+
+
 # ---------------------------------------------------------------------------------------------------------- elements
 class _Stops(DeclaredElement):
     """Stops of one stiffness: its coefficients are that, a gap for every stop and, of a regularised law, the sharpness.
@@ -120,13 +132,7 @@ class _Stops(DeclaredElement):
         return PiecewiseLinear(tuple(Piece(0, gap, side) for gap, side in enumerate(self.sides, start=1)))
 
     def _written(self) -> tuple[Law, list[int], list[int]]:
-        """The law as a text; where its coefficients, in alphabetical order, stand among those here, and conversely."""
-        from suboctave.model.expressions.law import law_of
-
-        stops = zip(self.sides, self.coefficient_names[1:], strict=False)
-        text = " + ".join(_text(side, gap, self.regularised) for side, gap in stops)
-        order = np.argsort(self.coefficient_names)
-        return law_of(text, ("x",), False, type(self).__name__), order.tolist(), np.argsort(order).tolist()
+        return _law_of(self.sides, self.coefficient_names, self.regularised, type(self).__name__)
 
     def coefficient_tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, None]:
         """See `Element.coefficient_tangent`; for the exact law the regular parts."""
