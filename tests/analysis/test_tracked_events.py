@@ -15,7 +15,7 @@ from suboctave.curves.sample import Sample
 from suboctave.curves.tracked.events import events_between
 from suboctave.curves.tracked.nearest import nearest_point, same_discretisation, zero_along
 from suboctave.curves.tracked.start import curve_through
-from suboctave.curves.tracked.tests import Extremum, GeneralisedDoubling
+from suboctave.curves.tracked.tests import CurveTest, Extremum, GeneralisedDoubling
 from suboctave.harmonic.basis import HarmonicBasis
 
 OPTIONS = NewtonOptions()
@@ -73,3 +73,24 @@ def test_is_found_once(kind, before, after, heading):
     (item,) = found
     assert float(item.sample.point.u[-2]) == pytest.approx(float(own.u[-2]), abs=2.0 * abs(shift))
     assert item.sample.point.arclength == pytest.approx(WAY, abs=2.0 * abs(shift))
+
+
+class Given(CurveTest):
+    """A test whose value at a point is the point."""
+
+    kind = "given"
+
+    def value(self, sample):
+        return sample
+
+
+@pytest.mark.parametrize("odd", [True, False])
+@pytest.mark.parametrize("ahead", [1.0, -1.0])
+def test_an_exact_zero_at_the_start_is_an_event_of_one_direction(odd, ahead):
+    """Turned round, a component of the tangent changes its sign, a zero too; what the motion gives does not."""
+    turned = -1.0 if odd else 1.0
+    forward = Given().changed(0.0, ahead)
+    back = Given().changed(turned * 0.0, turned * -ahead)
+    assert (forward, back).count(True) == 1
+    # passed on the way it is met once
+    assert [Given().changed(-ahead, 0.0), Given().changed(0.0, ahead)].count(True) == 1

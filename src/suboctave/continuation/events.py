@@ -118,6 +118,10 @@ class Bracket:
                     value = 0.0 if abs(value) < little else value
                     return math.asinh(value / unit) if unit else value
 
-                return float(scipy.optimize.brentq(scaled, low, high, xtol=resolved, rtol=8.9e-16, maxiter=200))
+                share, result = scipy.optimize.brentq(
+                    scaled, low, high, xtol=resolved, rtol=8.9e-16, maxiter=200, full_output=True, disp=False
+                )
+                if result.converged:
+                    return float(share)
         a, b = self.points[0.0], self.points[1.0]
-        raise ConvergenceError(f"no change of sign between {a.curve.where(a.u)} and {b.curve.where(b.u)}")
+        raise ConvergenceError(f"no zero was located between {a.curve.where(a.u)} and {b.curve.where(b.u)}")
