@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from suboctave.compiled import kernel
-from suboctave.harmonic.basis import Array, ComplexArray, spectrum_to_real, to_complex
+from suboctave.harmonic.basis import Array, ComplexArray
 
 __all__ = [
     "Sparse",
@@ -37,13 +37,6 @@ def sparse(directions: Array) -> Sparse:
 
 _ALONE = sparse(np.ones((1, 1)))
 _NO_BLOCKS = np.zeros((0, 1, 1), dtype=complex)
-
-
-def apply_blocks(blocks: ComplexArray, x: Array) -> Array:
-    """Complex matrices per harmonic (H + 1, n, n) applied to real coefficients (2 H + 1, n)."""
-    waves = np.matmul(blocks, to_complex(x)[:, :, None])[:, :, 0]
-    waves[1:] *= 0.5
-    return spectrum_to_real(waves, len(waves) - 1)
 
 
 def galerkin(stiffness: ComplexArray, damping: ComplexArray | None, rate: float, mean: bool, count: int) -> Array:
@@ -72,6 +65,24 @@ def block_diagonal(blocks: ComplexArray, mean: bool) -> Array:
 
 
 @kernel()
+def apply_blocks(blocks, x):
+    """Complex matrices per harmonic (H + 1, n, n) applied to real coefficients (2 H + 1, n)."""
+    out = np.zeros(x.shape)
+    for h in range(blocks.shape[0]):
+        # amplitude a - i b of a cos + b sin
+        cosine = max(0, 2 * h - 1)
+        for i in range(x.shape[1]):
+            for j in range(x.shape[1]):
+                p = blocks[h, i, j].real
+                out[cosine, i] += p * x[cosine, j]
+                if h > 0:
+                    q = blocks[h, i, j].imag
+                    out[cosine, i] += q * x[cosine + 1, j]
+                    out[cosine + 1, i] += p * x[cosine + 1, j] - q * x[cosine, j]
+    return out
+
+
+@kernel()
 def balance_residual(x, blocks, force, load, directions, weight, parts, sizes):
     """A X, F and `R = A X + F - P` into `parts` (3, 2 H + 1, n), and |R|, |A X|, |F|, |P| into `sizes` (4,).
 
@@ -79,24 +90,8 @@ def balance_residual(x, blocks, force, load, directions, weight, parts, sizes):
     weighted by `weight` per DOF.
     """
     rows, n = x.shape
-    linear, forces, residual = parts[0], parts[1], parts[2]
-    for h in range(blocks.shape[0]):
-        for i in range(n):
-            re = 0.0
-            im = 0.0
-            for j in range(n):
-                p = blocks[h, i, j].real
-                q = blocks[h, i, j].imag
-                # amplitude a - i b of a cos + b sin
-                a = x[0, j] if h == 0 else x[2 * h - 1, j]
-                b = 0.0 if h == 0 else -x[2 * h, j]
-                re += p * a - q * b
-                im += p * b + q * a
-            if h == 0:
-                linear[0, i] = re
-            else:
-                linear[2 * h - 1, i] = re
-                linear[2 * h, i] = -im
+    linear, forces, residual = apply_blocks(blocks, x), parts[1], parts[2]
+    parts[0] = linear
     for r in range(rows):
         for i in range(n):
             forces[r, i] = 0.0

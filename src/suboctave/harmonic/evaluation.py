@@ -305,25 +305,25 @@ class BalanceState:
 
     def residual_by(self, name: str) -> Array:
         """R differentiated by "omega" or a parameter, shape (dimension,)."""
-        linear, freq = self.linear, self.frequencies
-        result = np.zeros(self.x.shape)
-        if name == "omega":
-            m = self.basis.multiples[:, None, None]
-            result += apply_blocks(m * linear.stiffness(freq, 1), self.x)
-            slope = linear.compliance(freq, 1)
-            if slope is not None:
-                result += apply_blocks(m * slope, self.unbalanced)
-        elif name in self.balance.matrix_names:
-            block = linear.stiffness_by(freq, (name,))
-            if block is not None:
-                result += apply_blocks(block, self.x)
-            slope = linear.compliance_by(freq, (name,))
-            if slope is not None:
-                result += apply_blocks(slope, self.unbalanced)
+        block, slope = self.linear_by(name)
+        result = np.zeros(self.x.shape) if block is None else apply_blocks(block, self.x)
+        if slope is not None:
+            result += apply_blocks(slope, self.unbalanced)
         change = self.unbalanced_by(name)
         if change is not None:
             result += change if self.compliance is None else apply_blocks(self.compliance, change)
         return result.ravel()
+
+    def linear_by(self, name: str) -> tuple[ComplexArray | None, ComplexArray | None]:
+        """A and B at the harmonics differentiated by "omega" or a parameter, (H + 1, size, size); None for zero."""
+        linear, frequencies = self.linear, self.frequencies
+        if name == "omega":
+            k = self.basis.multiples[:, None, None]
+            slope = linear.compliance(frequencies, 1)
+            return k * linear.stiffness(frequencies, 1), None if slope is None else k * slope
+        if name not in self.balance.matrix_names:
+            return None, None
+        return linear.stiffness_by(frequencies, (name,)), linear.compliance_by(frequencies, (name,))
 
     @property
     def load(self) -> Array:

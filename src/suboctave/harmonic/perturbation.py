@@ -220,23 +220,17 @@ def parameter_gradient(state: BalanceState, left: Array, name: str, names: tuple
     """Derivative of `left . R_name` by the coefficients and by names ("omega" or parameters); `left` of the
     residual's size.
     """
-    linear, freq, m = state.linear, state.frequencies, state.basis.multiples[:, None, None]
     shaped = state.balance.shaped(left)
     # A_name and B_name per harmonic, transposed in the sense of the real basis: conjugate transpose of the complex
     # blocks
-    if name == "omega":
-        block: ComplexArray | None = linear.stiffness(freq, 1) * m
-        slope = linear.compliance(freq, 1)
-        slope = None if slope is None else slope * m
-    else:
-        block, slope = linear.stiffness_by(freq, (name,)), linear.compliance_by(freq, (name,))
+    block, slope = state.linear_by(name)
     gx = np.zeros_like(state.x)
     if block is not None:
-        gx += apply_blocks(block.conj().transpose(0, 2, 1), shaped)
+        gx += apply_blocks(_adjoint(block), shaped)
     if slope is not None:
-        pulled = apply_blocks(slope.conj().transpose(0, 2, 1), shaped)
+        pulled = apply_blocks(_adjoint(slope), shaped)
         gx += (state.force_jacobian.T @ pulled.ravel()).reshape(gx.shape)
-    u_force = shaped if state.compliance is None else apply_blocks(state.compliance.conj().transpose(0, 2, 1), shaped)
+    u_force = shaped if state.compliance is None else apply_blocks(_adjoint(state.compliance), shaped)
     if name == "omega":
         for channel in state.channels:
             if channel.moving:
@@ -250,6 +244,11 @@ def parameter_gradient(state: BalanceState, left: Array, name: str, names: tuple
         for other in names
     }
     return Gradient(gx, rates, 0.0)
+
+
+def _adjoint(blocks: ComplexArray) -> ComplexArray:
+    """The conjugate transpose of every block."""
+    return np.ascontiguousarray(blocks.conj().transpose(0, 2, 1))
 
 
 def along_inputs_of_form(state: BalanceState, channel: Channel, change: ComplexArray, left: Array) -> Array:

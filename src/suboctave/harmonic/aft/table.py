@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import zip_longest
-from typing import Any, NamedTuple
+from itertools import pairwise, zip_longest
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,21 +101,15 @@ class PackedLaws:
         self.pieces = np.array(pieces) if pieces else NO_ROWS
         self.steps = np.array(steps) if steps else NO_ROWS
         self.first, self.step_first = np.array(first), np.array(step_first)
+        #: the direction of every piece, (P,), and of every step, (S,)
+        self.owner, self.step_owner = _owners(first), _owners(step_first)
         self.polynomial = np.zeros((len(self.line), max(map(len, polynomials), default=0)))
         for row, polynomial in zip(self.polynomial, polynomials, strict=False):
             row[: len(polynomial)] = polynomial
+        #: what is known in closed form, as `closed_form.add_spectra` wants it
+        self.known = self.pieces, self.first, self.polynomial, self.steps, self.step_first, self.line
 
-    @property
-    def known(self) -> tuple[NDArray[Any], ...]:
-        """What is known in closed form, as `closed_form.add_spectra` wants it."""
-        return self.pieces, self.first, self.polynomial, self.steps, self.step_first, self.line
 
-    @property
-    def owner(self) -> NDArray[np.int64]:
-        """The direction of every piece, (P,)."""
-        return np.repeat(np.arange(len(self.line)), np.diff(self.first))
-
-    @property
-    def step_owner(self) -> NDArray[np.int64]:
-        """The direction of every step, (S,)."""
-        return np.repeat(np.arange(len(self.line)), np.diff(self.step_first))
+def _owners(first: list[int]) -> NDArray[np.int64]:
+    """The direction of every row, from where each direction's begin."""
+    return np.array([g for g, (low, high) in enumerate(pairwise(first)) for _ in range(low, high)], dtype=np.int64)
