@@ -16,6 +16,7 @@ from suboctave.harmonic.basis import Array, ComplexArray
 
 __all__ = [
     "Sparse",
+    "add_displacements",
     "add_operator",
     "apply_blocks",
     "balance_residual",
@@ -62,6 +63,18 @@ def block_diagonal(blocks: ComplexArray, mean: bool) -> Array:
     out = np.zeros((rows, rows))
     add_operator(out, np.zeros((3, 0, 1), dtype=complex), 0, False, 0.0, mean, _ALONE, _ALONE, blocks)
     return out
+
+
+@kernel()
+def add_displacements(x, directions, out):
+    """Add the complex coefficients of the displacements along directions (`sparse`), x (2 H + 1, n), to (G, H + 1)."""
+    starts, dofs, entries = directions
+    for g in range(out.shape[0]):
+        for s in range(starts[g], starts[g + 1]):
+            i, d = dofs[s], entries[s]
+            out[g, 0] += d * x[0, i]
+            for h in range(1, out.shape[1]):
+                out[g, h] += complex(d * x[2 * h - 1, i], -d * x[2 * h, i])
 
 
 @kernel()

@@ -143,15 +143,6 @@ def to_complex(coefficients: NDArray[Any]) -> ComplexArray:
     return result
 
 
-def by_rows(coefficients: Array) -> ComplexArray:
-    """The same of coefficients (G, 2 H + 1) to (G, H + 1)."""
-    result = np.empty((len(coefficients), coefficients.shape[1] // 2 + 1), dtype=complex)
-    result[:, 0] = coefficients[:, 0]
-    # cosine and sine of one harmonic lie side by side
-    np.conjugate(coefficients[:, 1:].view(complex), out=result[:, 1:])
-    return result
-
-
 def spectrum_to_real(spectrum: ComplexArray, harmonics: int) -> Array:
     """Fourier coefficients `g_q = mean(g exp(-i q tau))` to real ones `(a_0, a_1, b_1, ...)` up to `harmonics`; first
     axis.

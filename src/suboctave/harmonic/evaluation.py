@@ -7,6 +7,7 @@ in the notation of `equations`.
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -18,8 +19,17 @@ from suboctave.harmonic.aft.channel import Channel, Group, laws_along
 from suboctave.harmonic.aft.closed_form import add_spectra, places
 from suboctave.harmonic.aft.law import Along, LawAlong, LocalMotion
 from suboctave.harmonic.aft.table import PackedLaws
-from suboctave.harmonic.assembly import add_operator, apply_blocks, balance_residual, block_diagonal, sparse, toeplitz
-from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis, by_rows, spectrum_to_real
+from suboctave.harmonic.assembly import (
+    Sparse,
+    add_displacements,
+    add_operator,
+    apply_blocks,
+    balance_residual,
+    block_diagonal,
+    sparse,
+    toeplitz,
+)
+from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis, spectrum_to_real
 from suboctave.harmonic.equations import Equations, Laws
 from suboctave.harmonic.linear_part import LinearPart
 from suboctave.lazy import lazy
@@ -133,8 +143,12 @@ class BalanceState:
     @lazy
     def motions(self) -> ComplexArray:
         """Complex coefficients of the displacement along each group's direction, (G, H + 1)."""
-        balance = self.balance
-        return by_rows(balance.acting[: len(balance.groups)] @ self.x.T)
+        return self._displacements(self.balance.directions, len(self.balance.groups))
+
+    def _displacements(self, directions: Sparse, count: int) -> ComplexArray:
+        out = np.zeros((count, self.basis.harmonics + 1), dtype=complex)
+        add_displacements(self.x, directions, out)
+        return out
 
     @lazy
     def _along(self) -> list[tuple[Along, list[LawAlong]]]:
@@ -160,7 +174,8 @@ class BalanceState:
         """The channels of elements with several inputs, corners, or time."""
         channels = []
         for group in self.balance.own:
-            along = Along(by_rows(group.inputs @ self.x.T), self.rate, self.basis.nu, group.moving, self.balance.top)
+            motions = self._displacements(sparse(group.inputs), len(group.inputs))
+            along = Along(motions, self.rate, self.basis.nu, group.moving, self.balance.top)
             members = tuple([self.laws.members[i] for i in group.members])
             channels.append(Channel(group, along, laws_along(along, members)))
         return channels
@@ -186,11 +201,12 @@ class BalanceState:
                 for law in laws:
                     if not law.whole:
                         law.add_spectra(table[: 1 + along.size, g])
-        for c, channel in enumerate(self.own_channels, len(balance.groups)):
+        for c, channel in enumerate(self.own_channels if balance.own else (), len(balance.groups)):
             table[0, c] = channel.spectra[0]
             self._require_finite(channel.spectra, channel.group)
         # a number that is not finite at any instant is in all coefficients
-        if not np.isfinite(table[:, :, 0]).all():
+        means = table[:, :, 0].ravel()
+        if not cmath.isfinite(means.dot(means)):
             for g, group in enumerate(balance.groups):
                 self._require_finite(table[:, g], group)
         return table
@@ -388,27 +404,33 @@ class BalanceState:
 
         To first order `x_k = -A(k w0)^-1 B(k w0) f_k`, f_k the harmonics of the element forces beyond the basis.
         """
-        lowest = self.basis.harmonics + 1
-        force = 2.0 * self.force_spectra[:, lowest:].T @ self.balance.acting
-        frequency = np.asarray(np.arange(lowest, self.balance.top + 1) * self.rate, dtype=float)
-        compliance = self.linear.compliance(frequency)
+        high, top = self.basis.harmonics, self.balance.top
+        force = -2.0 * self.force_spectra.T[high + 1 :] @ self.balance.acting
+        frequencies = self.rate * np.arange(high + 1.0, top + 1.0)
+        compliance = self.linear.compliance(frequencies)
         if compliance is not None:
             force = np.einsum("kij,kj->ki", compliance, force)
-        blocks = self.linear.stiffness(frequency)
+        blocks = self.linear.stiffness(frequencies)
         if self.balance.size == 1:
-            return -(force / blocks[:, :, 0])
-        amplitudes = np.linalg.solve(blocks, force[:, :, None])[:, :, 0]
-        return np.asarray(-amplitudes, dtype=complex)
+            return force / blocks[:, :, 0]
+        return np.linalg.solve(blocks, force[:, :, None])[:, :, 0]
+
+    @lazy
+    def squares(self) -> Array:
+        """Squares of the sizes of the harmonics 0 .. 2 H + 1, with the weights of displacements (`scales`)."""
+        weight = self.balance.scales()[0] ** 2
+        rows, lacking = (self.x * self.x) @ weight, self.neglected
+        beyond = (lacking.real**2 + lacking.imag**2) @ weight
+        return np.concatenate((rows[:1], rows[1::2] + rows[2::2], beyond))
 
     @lazy
     def tails(self) -> tuple[Array, float]:
         """Size of all harmonics above k relative to the motion, k = 0 .. 2 H + 1, and the motion's size."""
-        x, lacking = (part * self.balance.scales()[0] for part in (self.x, self.neglected))
-        rows, beyond = np.einsum("ij,ij->i", x, x), np.einsum("ij,ij->i", lacking, lacking.conj()).real
-        squares = np.concatenate((rows[:1], rows[1::2] + rows[2::2], beyond))
-        size, tail = math.sqrt(rows.sum()), np.zeros(len(squares))
+        squares = self.squares
+        size = math.sqrt(squares[: self.basis.harmonics + 1].sum())
+        tail = np.zeros(len(squares))
         if size > 0.0:
-            tail[:-1] = np.sqrt(np.cumsum(squares[:0:-1])[::-1]) / size
+            tail[:-1] = np.sqrt(squares[:0:-1].cumsum()[::-1]) / size
         return tail, size
 
     @lazy

@@ -20,7 +20,7 @@ from functools import lru_cache
 import numpy as np
 
 from suboctave.errors import InputError, check_numbers
-from suboctave.harmonic.basis import Array, HarmonicBasis, to_complex
+from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.evaluation import BalanceState, length
 
 #: most unknowns that adaptive selection goes to: beyond, the dense matrices cost more than the harmonics are worth
@@ -168,9 +168,7 @@ def _class_tails(state: BalanceState) -> Array | None:
     """What each class of harmonics has beyond k = 0 .. 2 H + 1 relative to the motion, (classes, 2 H + 2); None at
     rest.
     """
-    nu, weight = state.basis.nu, state.balance.scales()[0]
-    amplitudes = np.concatenate((to_complex(state.x), state.neglected)) * weight
-    squares = np.sum(amplitudes.real**2 + amplitudes.imag**2, axis=1)
+    nu, squares = state.basis.nu, state.squares
     size = float(squares[: state.basis.harmonics + 1].sum())
     if size == 0.0:
         return None
