@@ -104,7 +104,6 @@ def balance_residual(x, blocks, force, load, directions, weight, parts, sizes):
     """
     rows, n = x.shape
     linear, forces, residual = apply_blocks(blocks, x), parts[1], parts[2]
-    parts[0] = linear
     for r in range(rows):
         for i in range(n):
             forces[r, i] = 0.0
@@ -120,6 +119,7 @@ def balance_residual(x, blocks, force, load, directions, weight, parts, sizes):
         sizes[k] = 0.0
     for r in range(rows):
         for i in range(n):
+            parts[0, r, i] = linear[r, i]
             residual[r, i] = linear[r, i] + forces[r, i] - load[r, i]
             w = weight[i] * weight[i]
             sizes[0] += w * residual[r, i] * residual[r, i]

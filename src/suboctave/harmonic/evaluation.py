@@ -16,7 +16,6 @@ import numpy as np
 
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.aft.channel import Channel, Group, laws_along
-from suboctave.harmonic.aft.closed_form import add_spectra, places
 from suboctave.harmonic.aft.law import Along, LawAlong, LocalMotion
 from suboctave.harmonic.aft.table import PackedLaws
 from suboctave.harmonic.assembly import (
@@ -193,9 +192,7 @@ class BalanceState:
         """
         balance, packed, motions = self.balance, self.packed, self.motions
         table = np.zeros((3, len(balance.all_groups), balance.top + 1), dtype=complex)
-        at = places(self.basis.harmonics, balance.top, max(0, packed.polynomial.shape[1] - 1))
-        if balance.groups:
-            add_spectra(motions, packed.known, *at, table)
+        packed.add_spectra(motions, table)
         if not packed.whole:
             for g, (along, laws) in enumerate(self._along):
                 for law in laws:
@@ -413,7 +410,7 @@ class BalanceState:
         blocks = self.linear.stiffness(frequencies)
         if self.balance.size == 1:
             return force / blocks[:, :, 0]
-        return np.linalg.solve(blocks, force[:, :, None])[:, :, 0]
+        return np.asarray(np.linalg.solve(blocks, force[:, :, None])[:, :, 0], dtype=complex)
 
     @lazy
     def squares(self) -> Array:

@@ -11,13 +11,10 @@ p the polynomial of degree 10 that agrees at the Chebyshev nodes, with an error 
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 
 import numpy as np
 
 from suboctave.compiled import kernel
-from suboctave.harmonic.basis import Array
-from suboctave.harmonic.quadrature import polynomial_nodes, rule_tables, search_grid, sharp_nodes
 from suboctave.harmonic.trigonometric import FAST, crossings_of, displacement, extrema, spectra
 
 #: no pieces or steps
@@ -26,15 +23,6 @@ _LOW, _HIGH = math.sqrt(2.0) - 1.0, math.sqrt(2.0) + 1.0
 _P0, _P1, _P2, _P3 = -0.3333333333333333, 0.1999999999999552, -0.14285714284666542, 0.11111111015256361
 _P4, _P5, _P6, _P7 = -0.09090904578123903, 0.07692183190826087, -0.06664511447381948, 0.0585814891280221
 _P8, _P9, _P10 = -0.0508544973794026, 0.03923165829558719, -0.01917688711906226
-
-
-@lru_cache(maxsize=64)
-def places(high: int, top: int, degree: int) -> tuple[tuple[Array, ...], tuple[Array, ...], tuple[Array, ...]]:
-    """Where laws are looked at, as `add_spectra` wants it, for motions of harmonics up to `high`, Fourier coefficients
-    up to `top`, polynomials of that degree.
-    """
-    grid, nodes = search_grid(high), polynomial_nodes(degree * high, top)
-    return (grid.zr, grid.zi), (nodes.zr, nodes.zi, nodes.weights), rule_tables()
 
 
 @kernel()
@@ -157,61 +145,50 @@ def add_step(u, point, width, factor, force, stiffness):
 
 
 @kernel()
-def add_spectra(motions, laws, grid, nodes, rules, table):
-    """Add the Fourier coefficients of laws along motions (G, H + 1) and of their slopes to `table` (>= 2, >= G,
-    top + 1).
+def add_pieces(motions, pieces, first, zr, zi, table):
+    """Add the Fourier coefficients of piecewise-linear laws along motions (G, H + 1), and of their slopes, to `table`
+    (>= 2, >= G, top + 1).
 
-    laws: see `PackedLaws.known`; grid: points on the circle for searches along the motion; nodes: those of the
-    polynomials, with weights; rules: `rule_tables`.
+    pieces, first: see `table.PackedLaws`; zr, zi: points on the circle for searches along the motion.
     """
-    pieces, first, polynomial, steps, step_first, line = laws
     top, high = table.shape[2] - 1, motions.shape[1] - 1
     for g in range(motions.shape[0]):
+        if first[g + 1] == first[g]:
+            continue
         c, force, stiffness = motions[g], table[0, g], table[1, g]
-        if first[g + 1] > first[g]:
-            turns = extrema(c, grid[0], grid[1])
-            slope = np.zeros(top + high + 1, dtype=np.complex128)
-            touching = False
-            for p in range(first[g], first[g + 1]):
-                k, gap, side = pieces[p, 0], pieces[p, 1], pieces[p, 2]
-                crossed, above = crossings_of(c, gap, turns)
-                if crossed.shape[0] == 0 and above != (side > 0):
-                    continue
-                touching = True
-                chi = contact_spectrum(crossed, above, side, top + high)
-                for q in range(top + high + 1):
-                    slope[q] += k * chi[q]
-                for q in range(top + 1):
-                    force[q] -= k * gap * chi[q]
-            if touching:
-                product = product_spectrum(c, 0.0, slope, top)
-                for q in range(top + 1):
-                    force[q] += product[q]
-                    stiffness[q] += slope[q]
-        for which in range(2):
-            # the polynomials at their nodes, then the steps at theirs, which depend on the motion
-            if which == 0:
-                if polynomial.shape[1] == 0:
-                    continue
-                zr, zi, weights, u = nodes[0], nodes[1], nodes[2], np.empty(nodes[0].shape[0])
-                displacement(c, zr, zi, u.reshape((1, u.shape[0])))
-                values = np.zeros((2, u.shape[0]))
-                add_values(polynomial[g], u, values[0], values[1])
-            else:
-                begin, end = step_first[g], step_first[g + 1]
-                if end == begin:
-                    continue
-                places, widths = steps[begin:end, 0].copy(), steps[begin:end, 1].copy()
-                zr, zi, weights = sharp_nodes(c, places, widths, top + high, grid[0], grid[1], rules[0], rules[1])
-                u = np.empty(zr.shape[0])
-                displacement(c, zr, zi, u.reshape((1, u.shape[0])))
-                values = np.empty((2, u.shape[0]))
-                for j in range(u.shape[0]):
-                    values[0, j] = line[g, 0] + line[g, 1] * u[j]
-                    values[1, j] = line[g, 1]
-                for s in range(begin, end):
-                    add_step(u, steps[s, 0], steps[s, 1], steps[s, 2] / math.pi, values[0], values[1])
-            sums = spectra(values, weights, zr, zi, top)
+        turns = extrema(c, zr, zi)
+        slope = np.zeros(top + high + 1, dtype=np.complex128)
+        touching = False
+        for p in range(first[g], first[g + 1]):
+            k, gap, side = pieces[p, 0], pieces[p, 1], pieces[p, 2]
+            crossed, above = crossings_of(c, gap, turns)
+            if crossed.shape[0] == 0 and above != (side > 0):
+                continue
+            touching = True
+            chi = contact_spectrum(crossed, above, side, top + high)
+            for q in range(top + high + 1):
+                slope[q] += k * chi[q]
             for q in range(top + 1):
-                force[q] += sums[0, q]
-                stiffness[q] += sums[1, q]
+                force[q] -= k * gap * chi[q]
+        if touching:
+            product = product_spectrum(c, 0.0, slope, top)
+            for q in range(top + 1):
+                force[q] += product[q]
+                stiffness[q] += slope[q]
+
+
+@kernel()
+def add_smooth(c, polynomial, steps, zr, zi, weights, table):
+    """Add the Fourier coefficients of a polynomial and of arctan steps (S, 3) along a motion (H + 1,), and of their
+    slope, to `table` (>= 2, top + 1), by nodes and weights on the circle.
+    """
+    u = np.empty((1, zr.shape[0]))
+    displacement(c, zr, zi, u)
+    values = np.zeros((2, zr.shape[0]))
+    add_values(polynomial, u[0], values[0], values[1])
+    for s in range(steps.shape[0]):
+        add_step(u[0], steps[s, 0], steps[s, 1], steps[s, 2] / math.pi, values[0], values[1])
+    sums = spectra(values, weights, zr, zi, table.shape[1] - 1)
+    for q in range(table.shape[1]):
+        table[0, q] += sums[0, q]
+        table[1, q] += sums[1, q]

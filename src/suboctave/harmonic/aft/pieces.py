@@ -13,7 +13,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from suboctave.harmonic.aft.closed_form import add_spectra, contact_spectrum, places, product_spectrum
+from suboctave.harmonic.aft.closed_form import contact_spectrum, product_spectrum
 from suboctave.harmonic.aft.law import CoefficientSpectra, LawAlong, Member, Second, Third
 from suboctave.harmonic.aft.table import PackedLaws
 from suboctave.harmonic.basis import Array, ComplexArray
@@ -30,8 +30,7 @@ class Pieces(LawAlong):
 
     def add_spectra(self, out: ComplexArray) -> None:
         """See `LawAlong.add_spectra`."""
-        along, known = self.along, PackedLaws([self.members]).known
-        add_spectra(along.motions, known, *places(along.high, along.top, 0), out[:, None])
+        PackedLaws([self.members]).add_spectra(self.along.motions, out[:, None])
 
     @lazy
     def _turns(self) -> Array:

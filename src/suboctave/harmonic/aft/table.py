@@ -9,10 +9,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from suboctave.harmonic.aft.closed_form import NO_ROWS
+from suboctave.harmonic.aft.closed_form import NO_ROWS, add_pieces, add_smooth
 from suboctave.harmonic.aft.law import Member
-from suboctave.harmonic.basis import Array
-from suboctave.harmonic.quadrature import FEWEST
+from suboctave.harmonic.basis import Array, ComplexArray
+from suboctave.harmonic.quadrature import FEWEST, graded_nodes, polynomial_nodes, search_grid
 from suboctave.model.elements.smoothness import (
     AdaptiveSampling,
     PiecewiseLinear,
@@ -106,8 +106,28 @@ class PackedLaws:
         self.polynomial = np.zeros((len(self.line), max(map(len, polynomials), default=0)))
         for row, polynomial in zip(self.polynomial, polynomials, strict=False):
             row[: len(polynomial)] = polynomial
-        #: what is known in closed form, as `closed_form.add_spectra` wants it
-        self.known = self.pieces, self.first, self.polynomial, self.steps, self.step_first, self.line
+        #: direction, steps, and these' places and widths
+        self._stepped = [
+            (g, rows, rows[:, 0].copy(), rows[:, 1].copy())
+            for g, (low, high) in enumerate(pairwise(step_first))
+            if len(rows := self.steps[low:high])
+        ]
+
+    def add_spectra(self, motions: ComplexArray, table: ComplexArray) -> None:
+        """Add the Fourier coefficients of the laws known in closed form along motions (G, H + 1), and of their slopes,
+        to `table` (>= 2, >= G, top + 1).
+        """
+        high, top = motions.shape[1] - 1, table.shape[2] - 1
+        if len(self.pieces):
+            grid = search_grid(high)
+            add_pieces(motions, self.pieces, self.first, grid.zr, grid.zi, table)
+        if self.polynomial.shape[1]:
+            nodes = polynomial_nodes((self.polynomial.shape[1] - 1) * high, top)
+            for g, c in enumerate(motions):
+                add_smooth(c, self.polynomial[g], NO_ROWS, nodes.zr, nodes.zi, nodes.weights, table[:, g])
+        for g, steps, places, widths in self._stepped:
+            nodes = graded_nodes(motions[g], places, widths, top)
+            add_smooth(motions[g], self.line[g], steps, nodes.zr, nodes.zi, nodes.weights, table[:, g])
 
 
 def _owners(first: list[int]) -> NDArray[np.int64]:
