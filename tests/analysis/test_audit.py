@@ -14,7 +14,7 @@ from slow import slow
 
 import suboctave as so
 from suboctave.curves.audit import Audit, Unsettled
-from suboctave.curves.crossings import doubtful
+from suboctave.curves.crossings import first_doubtful
 from suboctave.timedomain import locate_by_shooting, shoot
 
 #: beside the default, largest steps that hold whole pairs of events
@@ -27,6 +27,13 @@ def both_ways(system, omega, max_step=None, harmonics="adaptive", **options):
     low, high = omega
     ways = ((low, high), (high, low))
     return [so.frequency_response(system, way, harmonics, max_step=max_step, **options) for way in ways]
+
+
+def doubtful(places, values, at):
+    """Where a zero of one function may hide."""
+    signs, sizes = np.where(np.asarray(values) < 0.0, -1.0, 1.0), np.log(np.maximum(np.abs(values), 1e-300))
+    doubt = first_doubtful(places, [np.array([[sign], [size]]) for sign, size in zip(signs, sizes, strict=True)], at)
+    return None if doubt is None else doubt[1]
 
 
 def places(curve, kind):

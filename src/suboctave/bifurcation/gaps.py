@@ -15,13 +15,12 @@ from suboctave.harmonic.aft.law import LocalMotion
 from suboctave.harmonic.basis import Array
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.trigonometric import extrema
-from suboctave.lazy import lazy
 from suboctave.model.elements.base import BaseElement, Element
 from suboctave.model.elements.coupled import CoupledElement, as_coupled, reads
 from suboctave.model.elements.smoothness import CornerSampling, PiecewiseLinear, levels as levels_of
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, slots=True)
 class GapExtrema:
     """One gap and the extrema of the relative displacement there, ascending in tau.
 
@@ -35,22 +34,6 @@ class GapExtrema:
     tau: Array
     value: Array
     curve: Array
-
-    @lazy
-    def sides(self) -> Array:
-        """+1 for maxima, -1 for minima, (m,)."""
-        return np.where(self.curve > 0.0, -1.0, 1.0)
-
-    @lazy
-    def beyond(self) -> Array:
-        """How far the maxima lie above the gap, and the minima below it, (m,)."""
-        heights: Array = self.sides * (self.value - self.level)
-        return heights
-
-    def small(self, share: float) -> list[int]:
-        """The extrema that lie beyond the gap, by less than a share of the largest displacement."""
-        limit = share * max(self.value.max(initial=0.0), -self.value.min(initial=0.0))
-        return [i for i, height in enumerate(self.beyond.tolist()) if 0.0 < height < limit]
 
 
 def gap_extrema(state: BalanceState) -> tuple[GapExtrema, ...]:

@@ -22,11 +22,9 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from suboctave.compiled import kernel
-
-Numbers = Sequence[float] | NDArray[np.float64]
+from suboctave.continuation.problem import Array
 
 #: times its distance from what could be foretold up to which the interpolating cubic is believed
 SAFETY = 2.0
@@ -34,40 +32,39 @@ SAFETY = 2.0
 _GRID = np.array([0.02, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.98])
 
 
-def doubtful(places: Numbers, values: Numbers, at: int) -> float | None:
-    """Where between `places[at]` and `places[at + 1]` a zero may hide, as a fraction of the interval; None if nowhere.
+def first_doubtful(places: Sequence[float], tests: Sequence[Array], at: int) -> tuple[int, float] | None:
+    """The first of several functions of which a zero may hide between `places[at]` and `places[at + 1]`, and where, as
+    a fraction of the interval, not too close to its ends, so that both parts shrink; None if none is in doubt.
 
     Parameters
     ----------
     places
         Three to six different places in ascending order, up to two on either side of the interval.
-    values
-        The function there. A zero counts as positive: the side of an exact zero is the caller's business.
-    """
-    share = _doubtful(np.asarray(places), np.ascontiguousarray(values), at)
-    # not too close to the ends, so that both parts shrink
-    return None if share < 0.0 else min(0.6, max(0.4, share))
-
-
-def first_doubtful(places: Numbers, tests: Sequence[NDArray[np.float64]], at: int) -> tuple[int, float] | None:
-    """The first of several functions of which `doubtful` is not sure, and where; None if none is in doubt.
-
-    Parameters
-    ----------
     tests
-        At every place the functions' signs and logarithms of moduli, shape (2, m).
+        At every place the functions' signs and logarithms of moduli, shape (2, m). The side of an exact zero is the
+        caller's business.
     """
-    x, (signs, sizes) = np.array(places), np.array(tests).transpose(1, 2, 0)
-    # in units of the largest: products of many factors leave the range of numbers
-    with np.errstate(invalid="ignore"):
-        values = signs * np.exp(sizes - sizes.max(axis=1)[:, None])
-    for k, function in enumerate(values):
+    k, share = _first_doubtful(np.array(places), np.array(tests), at)
+    return None if share < 0.0 else (k, min(0.6, max(0.4, share)))
+
+
+@kernel()
+def _first_doubtful(places, tests, at):
+    """`first_doubtful` of tests (N, 2, m): which function, and the share, which is -1 where none is in doubt."""
+    n, functions = places.shape[0], tests.shape[2]
+    values = np.empty(n)
+    for k in range(functions):
+        # in units of the largest: products of many factors leave the range of numbers
+        largest = tests[0, 1, k]
+        for i in range(1, n):
+            largest = max(largest, tests[i, 1, k])
+        for i in range(n):
+            values[i] = tests[i, 0, k] * np.exp(tests[i, 1, k] - largest)
         # one that is nothing all along says nothing
-        if not math.isnan(function[0]):
-            share = doubtful(x, function, at)
-            if share is not None:
-                return k, share
-    return None
+        share = -1.0 if np.isnan(values[0]) else _doubtful(places, values, at)
+        if share >= 0.0:
+            return k, share
+    return functions, -1.0
 
 
 @kernel()
@@ -103,7 +100,7 @@ def _differences(places, values, at):
 
 @kernel()
 def _doubtful(places, values, at):
-    """`doubtful`; -1 for nowhere."""
+    """The share at which a zero of one function may hide, -1 for nowhere."""
     p, q = places[at], places[at + 1]
     fp, fq = values[at], values[at + 1]
     h = q - p
@@ -177,4 +174,4 @@ def _doubtful(places, values, at):
     return -1.0
 
 
-__all__ = ["SAFETY", "doubtful", "first_doubtful"]
+__all__ = ["SAFETY", "first_doubtful"]

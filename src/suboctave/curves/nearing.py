@@ -7,9 +7,9 @@ it is: an interval is too long if an excursion across a gap shrinks to less than
 
 from __future__ import annotations
 
-import numpy as np
+import math
 
-from suboctave.bifurcation.gaps import GapExtrema
+from suboctave.compiled import kernel
 from suboctave.curves.sample import Sample
 from suboctave.harmonic.trigonometric import passages
 
@@ -32,21 +32,33 @@ def contacts_between(p: Sample, q: Sample) -> int:
     """
     near = NOTHING
     for a, b in zip(p.gaps, q.gaps, strict=True):
-        _, count, crossed, other = passages(a.tau, a.value, a.curve, a.level, b.tau, b.value, b.curve, b.level)
+        one, two = (a.tau, a.value, a.curve, a.level), (b.tau, b.value, b.curve, b.level)
+        _, count, crossed, other = passages(*one, *two)
         if count > 0 or crossed != other:
             return GRAZES
-        near = near or (FIRST if _shrinks(a, b) else LAST if _shrinks(b, a) else NOTHING)
+        near = near or (FIRST if _shrinks(*one, *two) else LAST if _shrinks(*two, *one) else NOTHING)
     return near
 
 
-def _shrinks(one: GapExtrema, other: GapExtrema) -> bool:
-    """Whether an excursion of one motion is a small part of the same excursion of another."""
-    for i in one.small(YOUNG):
-        same = np.flatnonzero(other.sides == one.sides[i])
-        if same.size:
-            j = same[np.cos(other.tau[same] - one.tau[i]).argmax()]
-            if one.beyond[i] < SHRINKS * other.beyond[j]:
-                return True
+@kernel()
+def _shrinks(ta, xa, sa, level_a, tb, xb, sb, level_b):
+    """Whether an excursion of motion a across its level is a small part of the same excursion of motion b; extrema as
+    `passages` takes them.
+    """
+    largest = 0.0
+    for i in range(xa.shape[0]):
+        largest = max(largest, abs(xa[i]))
+    for i in range(xa.shape[0]):
+        height = level_a - xa[i] if sa[i] > 0.0 else xa[i] - level_a
+        if not 0.0 < height < YOUNG * largest:
+            continue
+        nearest, same = -2.0, 0.0
+        for j in range(xb.shape[0]):
+            near = math.cos(tb[j] - ta[i])
+            if (sb[j] > 0.0) == (sa[i] > 0.0) and near > nearest:
+                nearest, same = near, (level_b - xb[j] if sb[j] > 0.0 else xb[j] - level_b)
+        if height < SHRINKS * same:
+            return True
     return False
 
 

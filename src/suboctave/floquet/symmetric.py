@@ -12,10 +12,9 @@ sqrt(1 + |mu|^2), that keeps large multipliers from drowning the rest.
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 
+from suboctave.compiled import kernel
 from suboctave.harmonic.basis import Array, ComplexArray
 
 #: sum of the logarithms of all multipliers, `-int trace(M^-1 (C + f_v)) dt`, below which a motion counts as undamped
@@ -29,24 +28,24 @@ def symmetric_functions(mu: ComplexArray) -> Array:
     `torus` is constant for motions without damping, whose pairs never leave the circle. Complex factors come in
     conjugate pairs: the sign is that of the real ones.
     """
-    m, (first, second) = len(mu), _pairs(len(mu))
-    of = np.concatenate((mu, mu, mu[first] * mu[second]))
-    factors = 1.0 - of
-    factors[m : 2 * m] = 1.0 + mu
-    size = np.abs(of)
-    negative = (np.abs(of.imag) <= 1e-12 * size) & (factors.real < 0.0)
-    with np.errstate(all="ignore"):
-        logs = np.log(np.abs(factors)) - 0.5 * np.log1p(size * size)
-        damped = abs(np.log(size[:m]).sum()) >= UNDAMPED
-    out = np.array([[1.0, 1.0, 1.0], [0.0, 0.0, 0.0]])
-    for k in range(3 if damped else 2):
-        part = slice(k * m, (k + 1) * m if k < 2 else None)
-        out[0, k] = -1.0 if np.count_nonzero(negative[part]) % 2 else 1.0
-        out[1, k] = logs[part].sum()
+    out = np.empty((2, 3))
+    _multiply(mu, out)
     return out
 
 
-@lru_cache(maxsize=16)
-def _pairs(count: int) -> tuple[np.ndarray, ...]:
-    """All pairs of so many multipliers, as their first and second members."""
-    return np.triu_indices(count, 1)
+@kernel()
+def _multiply(mu, out):
+    """`symmetric_functions` into (2, 3)."""
+    m, total = mu.shape[0], 0.0
+    for i in range(m):
+        total += np.log(np.abs(mu[i]))
+    for k in range(3):
+        sign, logarithm = 1.0, 0.0
+        for i in range(m if k < 2 or abs(total) >= UNDAMPED else 0):
+            for j in range(i if k == 2 else 1):
+                of = mu[i] * mu[j] if k == 2 else mu[i]
+                factor, size = (1.0 + of if k == 1 else 1.0 - of), np.abs(of)
+                if abs(of.imag) <= 1e-12 * size and factor.real < 0.0:
+                    sign = -sign
+                logarithm += np.log(np.abs(factor)) - 0.5 * np.log1p(size * size)
+        out[0, k], out[1, k] = sign, logarithm
