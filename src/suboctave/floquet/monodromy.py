@@ -499,8 +499,7 @@ class _Motion:
         after = along.corrected(change)
         real, imaginary, left, right, _ = lapack.dgeev(after, 1, 1)
         mu, shift = multipliers_and_shifts(real, imaginary, left, right, after, self.before)
-        order = np.argsort(-np.abs(mu), kind="stable")
-        return mu[order], shift[order], share
+        return mu, shift, share
 
     def gap(self) -> float:
         """Distance to +1 of the nearest multiplier of the motion as it stands."""

@@ -20,13 +20,12 @@ import numpy as np
 
 from suboctave.compiled import kernel
 from suboctave.floquet.time_mesh import ADJOINT, INTEGRATION, LOWER, ORDER, WEIGHTS
-from suboctave.harmonic.basis import Array
 
 #: sums may be reordered; infinities keep their meaning
 _FAST = {"reassoc", "contract", "nsz"}
 #: relative errors of the entries of a monodromy matrix by rounding
 _ROUNDING = 1e-15
-_ONE, _TINY = np.ones(1), float(np.finfo(float).tiny)
+_TINY = float(np.finfo(float).tiny)
 
 
 @kernel(fastmath=_FAST, error_model="numpy")
@@ -250,29 +249,44 @@ def parts_needed(spans, law, base, active, stiffness, damping, shares, longest):
     return parts, total
 
 
-def response(start: Array, nodes: Array, active: np.ndarray, path: Array, largest: float) -> tuple[Array, float]:
+@kernel()
+def response(start, nodes, active, path, largest):
     """q_g, q_g' at the nodes along all channels, (C, 2, N), of the response that begins with the state `start`, and the
     share of it that is left: none is larger than `largest` times the displacement.
 
     nodes: see `propagate`; path (C, 2, N): the motion along all channels; active (G,): those that act.
     """
-    panels, groups = len(nodes), len(active)
-    moved = nodes.reshape(-1, nodes.shape[2]) @ np.concatenate((start, _ONE))
-    moved = moved.reshape(panels, 2, groups, ORDER)
-    out = np.zeros(path.shape)
-    # the last node of a panel is the first of the next
-    out[active, :, :-1] = moved[..., :-1].transpose(2, 1, 0, 3).reshape(groups, 2, -1)
-    out[active, :, -1] = moved[-1, :, :, -1].T
-    size, limit = np.abs(out[:, 0]).max(axis=1), largest * np.abs(path[:, 0]).max(axis=1)
-    worst = float((size / np.maximum(limit, _TINY)).max())
-    if not worst < math.inf:
+    groups, m, last = active.shape[0], ORDER, nodes.shape[2] - 1
+    out, worst = np.zeros(path.shape), 0.0
+    for g in range(groups):
+        channel, size, limit = active[g], 0.0, _TINY
+        for p in range(nodes.shape[0]):
+            for j in range(m):
+                # the last node of a panel is the first of the next
+                at = p * (m - 1) + j
+                for part in range(2):
+                    row = (part * groups + g) * m + j
+                    value = nodes[p, row, last]
+                    for i in range(last):
+                        value += nodes[p, row, i] * start[i]
+                    out[channel, part, at] = value
+                size = max(size, abs(out[channel, 0, at])) if out[channel, 0, at] == out[channel, 0, at] else np.inf
+                limit = max(limit, largest * abs(path[channel, 0, at]))
+        worst = max(worst, size / limit)
+    if worst == np.inf:
         return np.zeros(path.shape), 0.0
-    return (out, 1.0) if worst <= 1.0 else (out / worst, 1.0 / worst)
+    share = 1.0 if worst <= 1.0 else 1.0 / worst
+    if share < 1.0:
+        for channel in active:
+            for part in range(2):
+                for at in range(path.shape[2]):
+                    out[channel, part, at] *= share
+    return out, share
 
 
 @kernel()
 def multipliers_and_shifts(real, imaginary, left, right, phi, before):
-    """Eigenvalues of phi (N, N), and how far each may have moved from those of `before`, and by
+    """Eigenvalues of phi (N, N) by descending modulus, and how far each may have moved from those of `before`, and by
     rounding of the entries; both (N,).
 
     real, imaginary (N,), left, right (N, N): as LAPACK's geev has them, conjugate vectors as real and imaginary parts.
@@ -308,4 +322,9 @@ def multipliers_and_shifts(real, imaginary, left, right, phi, before):
             by_rounding += abs(u[i]) * rounded
         first = (abs(by_change) + _ROUNDING * by_rounding) / abs(scale) if abs(scale) > 0.0 else np.inf
         moved[j] = min(first, most) + 1e-14
+    for k in range(1, size):
+        while k > 0 and abs(mu[k - 1]) < abs(mu[k]):
+            mu[k - 1], mu[k] = mu[k], mu[k - 1]
+            moved[k - 1], moved[k] = moved[k], moved[k - 1]
+            k -= 1
     return mu, moved

@@ -185,11 +185,17 @@ def split(panels: Array, start: np.ndarray, parts: np.ndarray) -> tuple[Array, n
     return rows, (ends - parts)[start]
 
 
-def longest_panel(c: ComplexArray, degree: int) -> float:
+@kernel()
+def longest_panel(c, degree):
     """Longest panel in tau for a tangent that is a polynomial of this degree in the motion c (G, H + 1)."""
-    size = np.abs(c)
-    relevant = np.flatnonzero((size > _RELEVANT * size.max(axis=1, keepdims=True)).any(axis=0))
-    top = int(relevant[-1]) if len(relevant) else 1
+    top = 0
+    for g in range(c.shape[0]):
+        size = 0.0
+        for k in range(c.shape[1]):
+            size = max(size, abs(c[g, k]))
+        for k in range(top + 1, c.shape[1]):
+            if abs(c[g, k]) > _RELEVANT * size:
+                top = k
     # quarters of a period at most: the least that a polynomial of degree six follows
     return min(_TANGENT / max(1, degree * top), _MOTION / (c.shape[1] - 1), 1.6)
 
