@@ -29,8 +29,8 @@ from suboctave.harmonic.assembly import apply_blocks, toeplitz
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.derivatives import Direction, change_at, second_derivative
 from suboctave.harmonic.evaluation import BalanceState
-from suboctave.harmonic.trigonometric import motion, wave_sums
-from suboctave.harmonic.waves import Frequencies, Kind, Waves, along_basis, as_waves, fourier
+from suboctave.harmonic.trigonometric import motion, pulled, wave_sums
+from suboctave.harmonic.waves import Frequencies, Kind, Waves, as_waves, fourier
 
 __all__ = ["Gradient", "Kind", "bilinear_gradient", "operator", "operator_along", "parameter_gradient"]
 
@@ -123,23 +123,21 @@ class _Form:
 
     def gradient(self, channel: Channel) -> tuple[np.ndarray, complex]:
         """Derivatives by the coefficients, (2 H + 1, size), and by omega at kept frequencies of the perturbation."""
-        along, high = channel.along, self.state.basis.harmonics
-        waves = np.concatenate(((self.force_u @ channel.out)[None], self.rows(channel)))
+        along, high, free = channel.along, self.state.basis.harmonics, self.kind is Kind.FREE
         # the common factor exp(i f_0 tau) of all waves cancels in conj(left) * right
-        free = self.kind is Kind.FREE
-        gx = np.zeros((along.size, 2 * high + 1), dtype=complex if free else float)
-        by_omega = 0j
+        waves = np.concatenate(((self.force_u @ channel.out)[None], self.rows(channel)))
+        parts = 2 * along.size if free else along.size
+        by_state, by_omega = np.zeros((parts, 2 * high + 1)), 0.0
         for zr, zi, weights in channel.second:
-            left, *right = wave_sums(waves, zr, zi)
-            if along.size == 1:
-                product, share = (left.conj() * right[0])[None], weights[0, 0]
-            else:
-                product, share = left.conj() * np.einsum("rsn,sn->rn", weights, np.array(right)), np.ones_like(zr)
-            gx += along_basis(product if free else product.real, share, zr, zi, high)
-            for i, one in enumerate(along.motions if channel.moving else ()):
-                slope = motion(one, zr, zi)[1] / along.nu
-                by_omega += complex((product[channel.count + i] * slope).sum() / (2.0 * np.pi))
-        return along_inputs(channel, gx), by_omega
+            values = np.empty((parts, len(zr)))
+            pulled(waves, weights, zr, zi, values, by_state)
+            if channel.moving:
+                product = values[: along.size] + 1j * values[along.size :] if free else values
+                for i, one in enumerate(along.motions):
+                    slope = motion(one, zr, zi)[1] / along.nu
+                    by_omega = by_omega + (product[channel.count + i] * slope).sum() / (2.0 * np.pi)
+        gx = by_state[: along.size] + 1j * by_state[along.size :] if free else by_state
+        return along_inputs(channel, gx), complex(by_omega)
 
 
 def along_inputs(channel: Channel, by_state: np.ndarray) -> np.ndarray:
@@ -271,10 +269,8 @@ def _omega_gradient(state: BalanceState, channel: Channel, left: Array) -> Array
     rows += [as_waves(slope[:, None], Kind.INTEGER, False)[:, 0] for slope in slopes]
     by_state = np.zeros((channel.along.size, 2 * high + 1))
     for zr, zi, weights in channel.second:
-        waves = wave_sums(np.array(rows), zr, zi)
-        product = (waves[0].conj() * waves[1:]).real
-        by = np.einsum("rin,in->rn", weights[:, channel.count :], product)
-        by_state += along_basis(by, np.ones_like(zr), zr, zi, high)
+        values = np.empty((channel.along.size, len(zr)))
+        pulled(np.array(rows), np.ascontiguousarray(weights[:, channel.count :]), zr, zi, values, by_state)
     gx = along_inputs(channel, by_state)
     for i, d in enumerate(channel.ins):
         gx += np.multiply.outer(-basis.derivative(toeplitz(channel.damping(i), high).T @ left), d)

@@ -60,6 +60,34 @@ def displacement(c, zr, zi, out):
     sum_waves(factors, zr, zi, out, np.empty(out.shape))
 
 
+@kernel()
+def pulled(waves, weights, zr, zi, values, out):
+    """What `conj(left) W right` is at points z, (R, N) into the rows of `values` (real parts, then imaginary ones, or
+    real parts alone), and its integrals against 1, cos tau, sin tau, .. up to H likewise into `out` (., 2 H + 1).
+
+    waves (1 + Q, F): amplitudes of left and of the rows of right on one row of frequencies; weights W (R, Q, N).
+    """
+    rows, read, n = weights.shape
+    real, imaginary = np.empty((1 + read, n)), np.empty((1 + read, n))
+    sum_waves(waves, zr, zi, real, imaginary)
+    for r in range(rows):
+        for j in range(n):
+            a = b = 0.0
+            for s in range(read):
+                a += weights[r, s, j] * real[1 + s, j]
+                b += weights[r, s, j] * imaginary[1 + s, j]
+            values[r, j] = real[0, j] * a + imaginary[0, j] * b
+            if values.shape[0] > rows:
+                values[rows + r, j] = real[0, j] * b - imaginary[0, j] * a
+    high = out.shape[1] // 2
+    means = spectra(values, np.ones(n), zr, zi, high)
+    for r in range(values.shape[0]):
+        out[r, 0] += means[r, 0].real
+        for k in range(1, high + 1):
+            out[r, 2 * k - 1] += means[r, k].real
+            out[r, 2 * k] -= means[r, k].imag
+
+
 def motion(c: ComplexArray, zr: Array, zi: Array) -> Array:
     """Values and first derivative of `Re sum_k c_k z^k` with respect to tau at the points z; shape (2, N)."""
     out = np.empty((2, len(zr)))

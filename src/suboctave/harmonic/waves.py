@@ -17,7 +17,7 @@ from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.trigonometric import spectra
 
-__all__ = ["Frequencies", "Kind", "Waves", "along_basis", "fourier"]
+__all__ = ["Frequencies", "Kind", "Waves", "fourier"]
 
 
 class Kind(Enum):
@@ -112,15 +112,3 @@ def fourier(values: np.ndarray, weights: Array, zr: Array, zi: Array, top: int) 
     both = spectra(np.concatenate((values.real, values.imag)), weights, zr, zi, top)
     whole: ComplexArray = both[: len(values)] + 1j * both[len(values) :]
     return whole
-
-
-def along_basis(values: np.ndarray, weights: Array, zr: Array, zi: Array, high: int) -> np.ndarray:
-    """`mean(g phi_k)` for phi_k = 1, cos tau, sin tau, .. up to H of functions (R, N) at instants: (R, 2 H + 1)."""
-    parts = [values.real, values.imag] if np.iscomplexobj(values) else [values]
-    columns = []
-    for part in parts:
-        s = spectra(np.ascontiguousarray(part), weights, zr, zi, high)
-        rows = np.empty((len(part), 2 * high + 1))
-        rows[:, 0], rows[:, 1::2], rows[:, 2::2] = s[:, 0].real, s[:, 1:].real, -s[:, 1:].imag
-        columns.append(rows)
-    return columns[0] + 1j * columns[1] if len(columns) > 1 else columns[0]

@@ -13,12 +13,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from suboctave.compiled import kernel
 from suboctave.harmonic.aft.closed_form import contact_spectrum, product_spectrum
 from suboctave.harmonic.aft.law import CoefficientSpectra, LawAlong, Member, Second, Third
 from suboctave.harmonic.aft.table import PackedLaws
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.quadrature import search_grid
-from suboctave.harmonic.trigonometric import crossings_of, extrema, spectra
+from suboctave.harmonic.trigonometric import crossings_of, extrema, jet, spectra
 from suboctave.lazy import lazy
 from suboctave.model.elements.smoothness import Piece, PiecewiseLinear
 
@@ -41,7 +42,18 @@ class Pieces(LawAlong):
 
     @lazy
     def _corners(self) -> Array:
-        return corner_weights(self.along.motion, PackedLaws([self.members]).pieces, self._turns)
+        return self._at(
+            [
+                (float(member.coefficients[piece.stiffness]), float(member.coefficients[piece.gap]), piece.side)
+                for member in self.members
+                for piece in _pieces(member)
+            ]
+        )
+
+    def _at(self, pieces: list[tuple[float, float, float]]) -> Array:
+        """The crossings of pieces (stiffness, gap, side): see `corner_weights`."""
+        corners: Array = corner_weights(self.along.motion, np.array(pieces), self._turns)
+        return corners
 
     def second(self) -> list[Second]:
         """See `LawAlong.second`."""
@@ -55,18 +67,15 @@ class Pieces(LawAlong):
 
     def by_coefficients(self, member: Member) -> CoefficientSpectra:
         """See `LawAlong.by_coefficients`."""
-        along, c, count, turns = self.along, member.coefficients, len(member.coefficients), self._turns
+        along, c, count = self.along, member.coefficients, len(member.coefficients)
         force = np.zeros((count, along.top + 1), dtype=complex)
         tangent = np.zeros((count, 1, along.top + 1), dtype=complex)
         second = np.zeros((count, count, along.top + 1), dtype=complex)
         for piece in _pieces(member):
             i, j, gap = piece.stiffness, piece.gap, float(c[piece.gap])
-            tau, above = crossings_of(along.motion, gap, turns)
-            whole = contact_spectrum(tau, above, piece.side, along.top + along.high)
-            chi = whole[: along.top + 1]
-            zr, zi, weights, _, _ = corner_weights(along.motion, np.array([[1.0, gap, 1.0]]), turns)
-            comb = piece.side * c[i] * spectra(np.ones((1, len(zr))), weights, zr, zi, along.top)[0]
-            force[i] += product_spectrum(along.motion, gap, whole, along.top)
+            product, chi = self._contact(gap, piece.side)
+            comb = c[i] * self._comb(gap, piece.side)
+            force[i] += product
             force[j] -= c[i] * chi
             tangent[i, 0] += chi
             tangent[j, 0] -= comb
@@ -77,21 +86,30 @@ class Pieces(LawAlong):
 
     def add_change(self, rates: Mapping[int, Array], out: ComplexArray) -> None:
         """See `LawAlong.add_change`."""
-        c, high, top = self.along.motion, self.along.high, self.along.top
         for member in self.members:
             if member.number not in rates:
                 continue
             own, by = member.coefficients.tolist(), rates[member.number].tolist()
             for piece in _pieces(member):
                 gap, by_stiffness, by_gap = own[piece.gap], by[piece.stiffness], by[piece.gap]
-                crossed, above = crossings_of(c, gap, self._turns)
-                chi = contact_spectrum(crossed, above, piece.side, top + high)
-                force = by_gap * own[piece.stiffness]
-                out[0] += by_stiffness * product_spectrum(c, gap, chi, top) - force * chi[: top + 1]
-                out[1] += by_stiffness * chi[: top + 1]
+                product, chi = self._contact(gap, piece.side)
+                out[0] += by_stiffness * product - by_gap * own[piece.stiffness] * chi
+                out[1] += by_stiffness * chi
                 if by_gap != 0.0:
-                    weights = piece.side * force / (2.0 * math.pi * np.abs(_rates(c, crossed)[0]))
-                    out[1] -= weights @ np.exp(-1j * np.multiply.outer(crossed, np.arange(top + 1)))
+                    out[1] -= by_gap * own[piece.stiffness] * self._comb(gap, piece.side)
+
+    def _contact(self, gap: float, side: int) -> tuple[ComplexArray, ComplexArray]:
+        """Fourier coefficients of `(u - gap) chi`, and of chi."""
+        c, top = self.along.motion, self.along.top
+        crossed, above = crossings_of(c, gap, self._turns)
+        chi = contact_spectrum(crossed, above, side, top + self.along.high)
+        return product_spectrum(c, gap, chi, top), chi[: top + 1]
+
+    def _comb(self, gap: float, side: int) -> ComplexArray:
+        """Fourier coefficients of `side delta(u - gap)`."""
+        zr, zi, weights, _, _ = self._at([(1.0, gap, side)])
+        comb: ComplexArray = spectra(np.ones((1, len(zr))), weights, zr, zi, self.along.top)[0]
+        return comb
 
 
 def _pieces(member: Member) -> tuple[Piece, ...]:
@@ -99,22 +117,26 @@ def _pieces(member: Member) -> tuple[Piece, ...]:
     return member.kind.pieces
 
 
-def corner_weights(c: ComplexArray, pieces: Array, turns: Array) -> Array:
-    """Instants at which the gaps of piecewise-linear pieces (stiffness, gap, side) are crossed: cosines, sines, and the
-    weights there, (5, N); `f_uu` has `side stiffness / |u'|`.
+@kernel()
+def corner_weights(c, pieces, turns):
+    """Instants at which a motion crosses the gaps of piecewise-linear pieces (stiffness, gap, side): cosines, sines,
+    and the weights there of the second derivative, and of the third: regular, and along its slope; (5, N). `f_uu` has
+    `side stiffness / |u'|`, u' kept from zero where the motion grazes.
     """
-    corners = []
-    for k, gap, side in pieces.tolist():
-        tau, _ = crossings_of(c, gap, turns)
-        speed, bend = _rates(c, tau)
-        weight = side * k / np.abs(speed)
-        corners.append((np.cos(tau), np.sin(tau), weight, weight * bend / speed**2, -weight / speed))
-    return np.concatenate(corners, axis=1)
-
-
-def _rates(c: ComplexArray, tau: Array) -> tuple[Array, Array]:
-    """First and second derivative of the motion, the first kept from zero where the motion grazes."""
-    k = np.arange(len(c))
-    waves = c * np.exp(1j * np.multiply.outer(tau, k))
-    speed, least = -(waves.imag @ k), max(1e-12 * float(np.abs(c).max()), 1e-300)
-    return np.where(np.abs(speed) < least, np.copysign(least, speed), speed), -(waves.real @ (k * k))
+    least = 0.0
+    for k in range(c.shape[0]):
+        least = max(least, abs(c[k]))
+    least = max(1e-12 * least, 1e-300)
+    out, count = np.empty((5, pieces.shape[0] * turns.shape[1])), 0
+    for p in range(pieces.shape[0]):
+        at, _above = crossings_of(c, pieces[p, 1], turns)
+        for tau in at:
+            zr, zi = math.cos(tau), math.sin(tau)
+            _x, speed, bend = jet(c, zr, zi)
+            if abs(speed) < least:
+                speed = math.copysign(least, speed)
+            weight = pieces[p, 2] * pieces[p, 0] / abs(speed)
+            out[0, count], out[1, count], out[2, count] = zr, zi, weight
+            out[3, count], out[4, count] = weight * bend / speed**2, -weight / speed
+            count += 1
+    return out[:, :count].copy()
