@@ -15,7 +15,7 @@ import numpy as np
 
 from suboctave.compiled import kernel
 from suboctave.harmonic.aft.closed_form import add_step, add_values
-from suboctave.harmonic.basis import Array, ComplexArray
+from suboctave.harmonic.basis import Array
 from suboctave.harmonic.trigonometric import crossings_of, displacement, extrema, jet
 
 #: nodes per panel, both ends among them: quadrature of order 12

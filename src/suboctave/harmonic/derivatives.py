@@ -23,7 +23,7 @@ from suboctave.harmonic.aft.channel import Channel
 from suboctave.harmonic.assembly import apply_blocks, toeplitz
 from suboctave.harmonic.basis import Array, ComplexArray, spectrum_to_real, to_complex
 from suboctave.harmonic.evaluation import BalanceState
-from suboctave.harmonic.trigonometric import motion, spectra, wave_sums
+from suboctave.harmonic.trigonometric import motion, projected, spectra, wave_sums
 from suboctave.harmonic.waves import Frequencies, Kind, Waves
 
 __all__ = ["Direction", "Multilinear", "change_at", "second_derivative", "third_derivative"]
@@ -269,9 +269,6 @@ def _shift(out: Frequencies, *waves: Waves) -> int:
 
 def _project(values: ComplexArray, zr: Array, zi: Array, shift: int, count: int) -> ComplexArray:
     """Fourier coefficients `1/(2 pi) sum_j values_j z_j^(shift - k)`, k = 0 .. count - 1."""
-    index = np.arange(count) - shift
-    both = spectra(np.array((values.real, values.imag)), np.ones_like(zr), zr, zi, max(abs(shift), count - 1 - shift))
-    both = both[:, np.abs(index)]
-    # of real functions those of negative index are conjugate
-    np.conjugate(both, out=both, where=index < 0)
-    return both[0] + 1j * both[1]
+    out = np.empty(count, dtype=complex)
+    projected(values, zr, zi, shift, out)
+    return out

@@ -61,6 +61,20 @@ def displacement(c, zr, zi, out):
 
 
 @kernel()
+def projected(values, zr, zi, shift, out):
+    """`1/(2 pi) sum_j values_j z_j^(shift - k)` of complex values (N,) into `out` (K,), k = 0 .. K - 1."""
+    parts = np.empty((2, zr.shape[0]))
+    for j in range(zr.shape[0]):
+        parts[0, j], parts[1, j] = values[j].real, values[j].imag
+    last = out.shape[0] - 1 - shift
+    means = spectra(parts, np.ones(zr.shape[0]), zr, zi, max(abs(shift), abs(last)))
+    for k in range(out.shape[0]):
+        a, b = means[0, abs(k - shift)], means[1, abs(k - shift)]
+        # of real functions those of negative index are conjugate
+        out[k] = a + 1j * b if k >= shift else a.conjugate() + 1j * b.conjugate()
+
+
+@kernel()
 def pulled(waves, weights, zr, zi, values, out):
     """What `conj(left) W right` is at points z, (R, N) into the rows of `values` (real parts, then imaginary ones, or
     real parts alone), and its integrals against 1, cos tau, sin tau, .. up to H likewise into `out` (., 2 H + 1).
