@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 
+from suboctave.compiled import kernel
+
 Array = NDArray[np.float64]
 
 
@@ -59,6 +61,16 @@ def cosine(a: Array, b: Array, weights: Array) -> float:
     return float(a.dot(b)) / math.sqrt(a.dot(a) * b.dot(b))
 
 
+@kernel()
+def _sign(lu, pivots):
+    """Sign of a determinant, from LU factors that are not singular."""
+    sign = 1.0
+    for i in range(pivots.shape[0]):
+        if (lu[i, i] < 0.0) != (pivots[i] != i):
+            sign = -sign
+    return sign
+
+
 @dataclass(eq=False, slots=True)
 class Factor:
     """LU factors of a square real or complex matrix (`lapack.?getrf`), or of its transpose: of a real one that lies in
@@ -89,10 +101,7 @@ class Factor:
     @property
     def sign(self) -> float:
         """Sign of the determinant of a real matrix; 0 if singular."""
-        if self.singular:
-            return 0.0
-        swaps = np.count_nonzero(self.pivots != np.arange(len(self.pivots)))
-        return -1.0 if (swaps + np.count_nonzero(self.lu.diagonal() < 0.0)) % 2 else 1.0
+        return 0.0 if self.singular else _sign(self.lu, self.pivots)
 
     @property
     def log_determinant(self) -> float:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from suboctave.continuation.linear import Factor, bordered, distance, length
+from suboctave.continuation.linear import Factor, distance, length
 from suboctave.continuation.problem import Array, Evaluation, Problem
 from suboctave.errors import ConvergenceError, InputError, check_numbers
 from suboctave.interruption import check_time
@@ -90,10 +90,11 @@ def closely(options: NewtonOptions) -> NewtonOptions:
 
 def factorised(evaluation: Evaluation, row: Array | None, weights: Array) -> Factor:
     """Factorise `[F_u; row]`, or F_u alone, with columns scaled to arclength."""
-    jacobian = evaluation.jacobian
-    if row is None:
-        return Factor.of(jacobian / weights)
-    return bordered(jacobian, 1.0 / weights, np.empty((len(jacobian), 0)), row)
+    scaled = np.empty((len(weights), len(weights)))
+    np.divide(evaluation.jacobian, weights, out=scaled if row is None else scaled[:-1])
+    if row is not None:
+        scaled[-1] = row
+    return Factor.of(scaled, overwrite=True)
 
 
 def _takes_over(evaluation: Evaluation, other: Evaluation) -> bool:

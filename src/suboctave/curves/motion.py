@@ -86,8 +86,9 @@ class MotionEvaluation:
     @lazy
     def jacobian(self) -> Array:
         """Derivatives by u, shape (N, N + 1)."""
-        out = self.equations.jacobian(self.curve.names)
-        out[self.state.balance.dimension :] *= self.curve.force
+        out, size = self.equations.jacobian(self.curve.names), self.state.balance.dimension
+        if len(out) > size:
+            out[size:] *= self.curve.force
         return out
 
     def takes_over(self, other: Evaluation) -> bool:
