@@ -341,6 +341,10 @@ def _mixed(p: Sample, q: Sample) -> bool:
 
 def _movement(old: ComplexArray, new: ComplexArray) -> float:
     """Largest distance from a new multiplier of modulus above one half to the nearest old one."""
-    size = np.abs(new)
-    nearest = np.abs(new[:, None] - old).min(axis=1) / np.maximum(1.0, size)
-    return float(nearest[size > 0.5].max(initial=0.0))
+    # there are few that count: numbers are quicker than arrays
+    before, largest = old.tolist(), 0.0
+    for mu in new.tolist():
+        size = abs(mu)
+        if size > 0.5:
+            largest = max(largest, min(abs(mu - other) for other in before) / max(1.0, size))
+    return largest

@@ -75,6 +75,7 @@ _SLICE = 1e-9
 _ROUGH = 1e-6
 _NO_PASSAGES = np.zeros((2, 0))
 _NOTHING = Probe()
+_NO_START, _NO_NODES = np.empty((0, 1)), np.empty((0, 0, 0))
 
 
 class Linearised:
@@ -131,10 +132,13 @@ class Linearised:
 
     def _evaluated(self, panels: Array) -> tuple[np.ndarray, float]:
         """Evaluate all laws on panels; how many parts each of these needs, (P,), and how many panels that makes."""
-        laws = self._laws
-        self.spans, self.path, self.law, self.base = along_panels(
+        laws, count, channels = self._laws, len(panels), len(self._motions)
+        nodes = count * (ORDER - 1) + 1
+        self.spans, self.path = np.empty((count, ORDER)), np.empty((channels, 2, nodes))
+        self.law, self.base = np.zeros((channels, 4, nodes)), np.zeros((channels, count))
+        along_panels(
             panels, self._motions, self._forces, self.state.rate, laws.pieces, laws.owner, laws.polynomial, laws.steps,
-            laws.step_owner, laws.line,
+            laws.step_owner, laws.line, self.spans, self.path, self.law, self.base,
         )  # fmt: skip
         self._own.evaluate(self.path, self.law)
         parts: np.ndarray
@@ -144,29 +148,29 @@ class Linearised:
 
     def standing(self) -> tuple[Array, Array, Array]:
         """Along the motion as it stands, with the unbalanced force: see `propagate`."""
-        return self._propagated(self.law, np.zeros(self.base.shape), True)
+        start = np.empty((self.size, 1))
+        nodes = np.empty((len(self.spans), 2 * len(self.active) * ORDER, self.size + 1))
+        return self._propagated(self.law, np.zeros(self.base.shape), start, nodes), start[:, 0], nodes
 
     def corrected(self, change: Array) -> Array:
         """Monodromy matrix along the motion changed by (G, 2, N)."""
-        return self._propagated(*self._changed(change), False)[0]
+        return self._propagated(*self._changed(change), _NO_START, _NO_NODES)
 
-    def _propagated(self, law: Array, kick: Array, forced: bool) -> tuple[Array, Array, Array]:
+    def _propagated(self, law: Array, kick: Array, start: Array, nodes: Array) -> Array:
         modes, (kinds, structures) = self._modes, self._structures
-        result: tuple[Array, Array, Array] = propagate(
-            kinds, structures, law, self.base, kick, self.active, modes.left, modes.right, forced
-        )
-        return result
+        out = np.empty((self.size, self.size))
+        propagate(kinds, structures, law, self.base, kick, self.active, modes.left, modes.right, out, start, nodes)
+        return out
 
     def _changed(self, change: Array) -> tuple[Array, Array]:
         """Along the motion changed by (G, 2, N): no force, stiffness and damping (G, 3, N), kicks at the beginnings of
         panels (G, P).
         """
-        laws = self._laws
-        law: Array
-        kick: Array
-        law, kick = changed_laws(
+        laws, (channels, _, total) = self._laws, self.path.shape
+        law, kick = np.zeros((channels, 3, total)), np.zeros(self.base.shape)
+        changed_laws(
             self.path, self.law, change, self.state.rate, laws.pieces, laws.owner, laws.polynomial, laws.steps,
-            laws.step_owner, self.events, self.start, len(self.spans),
+            laws.step_owner, self.events, self.start, law, kick,
         )  # fmt: skip
         self._own.changed(self.path, change, law, self.spans)
         return law, kick
@@ -490,15 +494,15 @@ class _Motion:
         weight: share of its part along the direction of the real multiplier nearest to +1.
         """
         along, share, start = self.along, 1.0, self._start
-        if start is None:
-            change = np.zeros_like(along.path)
-        else:
+        change = np.zeros_like(along.path)
+        if start is not None:
             if weight < 1.0:
                 start = start - (1.0 - weight) * (projector(self.before) @ start)
-            change, share = response(start, self._nodes, along.active, along.path, _LARGEST)
+            share = response(start, self._nodes, along.active, along.path, _LARGEST, change)
         after = along.corrected(change)
+        mu, shift = np.empty(along.size, dtype=complex), np.empty(along.size)
         real, imaginary, left, right, _ = lapack.dgeev(after, 1, 1)
-        mu, shift = multipliers_and_shifts(real, imaginary, left, right, after, self.before)
+        multipliers_and_shifts(real, imaginary, left, right, after, self.before, mu, shift)
         return mu, shift, share
 
     def gap(self) -> float:

@@ -140,25 +140,24 @@ def structure(spans, stiffness, damping, left, right):
 
 
 @kernel(fastmath=_FAST, error_model="numpy")
-def propagate(kinds, structures, law, base, kick, active, left, right, forced):
-    """Along the panels of one period: the monodromy matrix (2 n, 2 n), the state in which the periodic response to the
-    forces begins, (2 n,), and q_g, q_g' at the nodes of all panels, (P, 2 G m, 2 n + 1).
+def propagate(kinds, structures, law, base, kick, active, left, right, monodromy, start, nodes):
+    """Along the panels of one period, into arrays: the monodromy matrix (2 n, 2 n), the state in which the periodic
+    response to the forces begins, (2 n, 1), and q_g, q_g' at the nodes of all panels, (P, 2 G m, 2 n + 1).
 
     kinds (P,), structures (D, ., .): see `structure`; law (C, >= 3, N): forces, stiffness and damping of all channels
     at the nodes of the period; base (C, P): what is added to the stiffness on every panel; kick (C, P): impulses
     `-kick left right^T y` at the beginnings of panels; active (G,): the channels that act.
 
-    If `forced`, laws are polynomials of lower degree on panels, and the nodes have one column for every initial state
-    and one for the forces; otherwise there are no forces, and the last two results are empty.
+    With forces laws are polynomials of lower degree on panels, and the nodes have one column for every initial state
+    and one for the forces; where `nodes` is empty there are none, and no periodic response.
     """
-    groups, panels, m = active.shape[0], kinds.shape[0], ORDER
+    groups, panels, m, forced = active.shape[0], kinds.shape[0], ORDER, nodes.shape[0] > 0
     n = left.shape[1]
     size, forces = 2 * n, groups * m
     columns = size + 1 if forced else size
     total, closing = np.zeros((size, columns)), np.zeros((size, size))
     for i in range(size):
         total[i, i] = closing[i, i] = 1.0
-    nodes = np.empty((panels if forced else 0, 2 * forces, columns))
     values, lower = np.empty((3, forces)), np.empty((3, forces))
     a = np.empty((forces, forces))
     f = np.empty((forces, columns))
@@ -208,8 +207,6 @@ def propagate(kinds, structures, law, base, kick, active, left, right, forced):
         _add_product(one[2 * forces :, :size], total, end)
         _add_product(one[2 * forces :, size:], f, end)
         total, end = end, total
-    monodromy = np.empty((size, size))
-    start = np.empty((size if forced else 0, 1))
     for i in range(size):
         for j in range(size):
             monodromy[i, j] = total[i, j]
@@ -218,7 +215,6 @@ def propagate(kinds, structures, law, base, kick, active, left, right, forced):
             start[i, 0] = total[i, size]
     if forced:
         eliminate(closing, start)
-    return monodromy, start[:, 0], nodes
 
 
 @kernel()
@@ -250,14 +246,14 @@ def parts_needed(spans, law, base, active, stiffness, damping, shares, longest):
 
 
 @kernel()
-def response(start, nodes, active, path, largest):
-    """q_g, q_g' at the nodes along all channels, (C, 2, N), of the response that begins with the state `start`, and the
-    share of it that is left: none is larger than `largest` times the displacement.
+def response(start, nodes, active, path, largest, out):
+    """q_g, q_g' at the nodes along all channels into `out` (C, 2, N), which is zero, of the response that begins with
+    the state `start`; returns the share of it that is left: none is larger than `largest` times the displacement.
 
     nodes: see `propagate`; path (C, 2, N): the motion along all channels; active (G,): those that act.
     """
     groups, m, last = active.shape[0], ORDER, nodes.shape[2] - 1
-    out, worst = np.zeros(path.shape), 0.0
+    worst = 0.0
     for g in range(groups):
         channel, size, limit = active[g], 0.0, _TINY
         for p in range(nodes.shape[0]):
@@ -273,26 +269,24 @@ def response(start, nodes, active, path, largest):
                 size = max(size, abs(out[channel, 0, at])) if out[channel, 0, at] == out[channel, 0, at] else np.inf
                 limit = max(limit, largest * abs(path[channel, 0, at]))
         worst = max(worst, size / limit)
-    if worst == np.inf:
-        return np.zeros(path.shape), 0.0
     share = 1.0 if worst <= 1.0 else 1.0 / worst
     if share < 1.0:
         for channel in active:
             for part in range(2):
                 for at in range(path.shape[2]):
-                    out[channel, part, at] *= share
-    return out, share
+                    # one that is not finite is left out
+                    out[channel, part, at] = out[channel, part, at] * share if share > 0.0 else 0.0
+    return share
 
 
 @kernel()
-def multipliers_and_shifts(real, imaginary, left, right, phi, before):
-    """Eigenvalues of phi (N, N) by descending modulus, and how far each may have moved from those of `before`, and by
-    rounding of the entries; both (N,).
+def multipliers_and_shifts(real, imaginary, left, right, phi, before, mu, moved):
+    """Eigenvalues of phi (N, N) by descending modulus into `mu` (N,), and how far each may have moved from those of
+    `before`, and by rounding of the entries, into `moved` (N,).
 
     real, imaginary (N,), left, right (N, N): as LAPACK's geev has them, conjugate vectors as real and imaginary parts.
     """
     size = phi.shape[0]
-    mu, moved = np.empty(size, dtype=np.complex128), np.empty(size)
     change, norm, largest = 0.0, 0.0, 1.0
     for i in range(size):
         mu[i] = complex(real[i], imaginary[i])
@@ -327,4 +321,3 @@ def multipliers_and_shifts(real, imaginary, left, right, phi, before):
             mu[k - 1], mu[k] = mu[k], mu[k - 1]
             moved[k - 1], moved[k] = moved[k], moved[k - 1]
             k -= 1
-    return mu, moved

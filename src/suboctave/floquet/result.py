@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -52,7 +53,7 @@ class FloquetResult:
     @lazy
     def applicable(self) -> bool:
         """False if the method could not say anything; `note` says why."""
-        return bool(np.isfinite(self.multipliers).all())
+        return all(map(cmath.isfinite, self.multipliers.tolist()))
 
     @property
     def error(self) -> float:

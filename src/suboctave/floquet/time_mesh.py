@@ -201,19 +201,19 @@ def longest_panel(c, degree):
 
 
 @kernel()
-def along_panels(panels, c, forces, rate, pieces, owner, polynomial, steps, step_owner, line):
+def along_panels(panels, c, forces, rate, pieces, owner, polynomial, steps, step_owner, line, spans, path, law, base):
     """Motion and laws at the nodes of panels; node j of panel p is node `p (m - 1) + j` of the period, N in all.
 
     panels: see `panels_between`; c (G, H + 1), forces (G, top + 1): displacement along the directions, and Fourier
     coefficients of the force there; pieces, owner: see `events_along`; polynomial (G, D); steps (S, 3),
     step_owner (S,), line (G, 2): of arctan steps gap, width, stiffness, direction, and constant and slope of the laws
-    that they belong to. Returns
+    that they belong to. Into arrays, the last two of which are zero:
 
-    - dt/ds on every panel, s in [-1, 1], (P, m)
-    - u, du/dt at the nodes, (G, 2, N)
-    - force beyond the basis, stiffness, damping at the nodes, and the part of the stiffness due to steps, (G, 4, N);
-      the stiffness without that of the pieces
-    - stiffness of the pieces on every panel, (G, P).
+    - spans: dt/ds on every panel, s in [-1, 1], (P, m)
+    - path: u, du/dt at the nodes, (G, 2, N)
+    - law: force beyond the basis, stiffness, damping at the nodes, and the part of the stiffness due to steps,
+      (G, 4, N); the stiffness without that of the pieces
+    - base: stiffness of the pieces on every panel, (G, P).
     """
     groups = c.shape[0]
     count = panels.shape[0]
@@ -221,7 +221,6 @@ def along_panels(panels, c, forces, rate, pieces, owner, polynomial, steps, step
     total = count * (m - 1) + 1
     cos = np.empty(total)
     sin = np.empty(total)
-    spans = np.empty((count, m))
     for p in range(count):
         half = 0.5 * (panels[p, 1] - panels[p, 0])
         depth = panels[p, 3]
@@ -234,9 +233,6 @@ def along_panels(panels, c, forces, rate, pieces, owner, polynomial, steps, step
                 spans[p, j] = 0.5 * depth * (e + 1.0 / e) * half / rate
             cos[p * (m - 1) + j] = math.cos(tau)
             sin[p * (m - 1) + j] = math.sin(tau)
-    path = np.empty((groups, 2, total))
-    law = np.zeros((groups, 4, total))
-    base = np.zeros((groups, count))
     within = np.empty(c.shape[1], dtype=np.complex128)
     for g in range(groups):
         for k in range(c.shape[1]):
@@ -265,23 +261,20 @@ def along_panels(panels, c, forces, rate, pieces, owner, polynomial, steps, step
         for j in range(total):
             if (u[j] > gap) == right:
                 law[g, 0, j] += k * (u[j] - gap)
-    return spans, path, law, base
 
 
 @kernel()
-def changed_laws(path, law, change, rate, pieces, owner, polynomial, steps, step_owner, events, start, panels):
+def changed_laws(path, law, change, rate, pieces, owner, polynomial, steps, step_owner, events, start, out, kick):
     """The laws known in closed form along the motion changed by `change` (G, 2, N).
 
-    path, law: see `along_panels`. Returns no force, stiffness, damping at the old nodes (G, 3, N), polynomials as they
-    are there, steps to first order (panels are graded towards the old passages; where the change exceeds a step's
-    width, the new ones lie between the nodes, and the linear form has the right integral all the same), and the
-    impulses `-kick y` at the beginnings of the panels (G, P) that stand for the movement of the contacts: a crossing
-    moves by `t = -d / u'` (a root of the parabola where the motion grazes), and a slice of stiffness k that is as thin
-    is an impulse k t.
+    path, law: see `along_panels`. Into `out` (G, 3, N), zeros: no force, stiffness, damping at the old nodes,
+    polynomials as they are there, steps to first order (panels are graded towards the old passages; where the change
+    exceeds a step's width, the new ones lie between the nodes, and the linear form has the right integral all the
+    same). Into `kick` (G, P), zeros: the impulses `-kick y` at the beginnings of the panels that stand for the movement
+    of the contacts: a crossing moves by `t = -d / u'` (a root of the parabola where the motion grazes), and a slice of
+    stiffness k that is as thin is an impulse k t.
     """
     groups, _, total = path.shape
-    out = np.zeros((groups, 3, total))
-    kick = np.zeros((groups, panels))
     for g in range(groups):
         for j in range(total):
             out[g, 1, j] = law[g, 3, j]
@@ -292,7 +285,7 @@ def changed_laws(path, law, change, rate, pieces, owner, polynomial, steps, step
         for j in range(total):
             ratio = (path[g, 0, j] - point) / width
             out[g, 1, j] += k / (width * (1.0 + ratio * ratio)) * change[g, 0, j]
-    m = (total - 1) // panels
+    m = (total - 1) // kick.shape[1]
     for i in range(events.shape[0]):
         q = int(events[i, 5])
         if q < 0:
@@ -319,4 +312,3 @@ def changed_laws(path, law, change, rate, pieces, owner, polynomial, steps, step
             shift = -slope / bend
         # a contact that begins later is missing for a while
         kick[g, p] += -k * shift if (events[i, 2] > 0.0) == right else k * shift
-    return out, kick

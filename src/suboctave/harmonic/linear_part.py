@@ -80,8 +80,7 @@ class StructuralMatrices:
 
     def stiffness(self, frequency: Array, order: int = 0) -> ComplexArray:
         """See `LinearPart.stiffness`."""
-        blocks: ComplexArray = dynamic_stiffness(self.matrices[0], self.matrices[1], self.matrices[2], frequency, order)
-        return blocks
+        return _blocks(self.matrices, frequency, order)
 
     def compliance(self, frequency: Array, order: int = 0) -> None:
         """Identity."""
@@ -93,9 +92,7 @@ class StructuralMatrices:
         if all(part is None for part in parts):
             return None
         zero = np.zeros((self.size, self.size))
-        mass, damping, stiffness = (zero if part is None else part for part in parts)
-        blocks: ComplexArray = dynamic_stiffness(mass, damping, stiffness, frequency, order)
-        return blocks
+        return _blocks(np.array([zero if part is None else part for part in parts]), frequency, order)
 
     def compliance_by(self, frequency: Array, names: tuple[str, ...], order: int = 0) -> None:
         """Identity."""
@@ -115,19 +112,27 @@ class StructuralMatrices:
         return direction
 
 
-@kernel()
-def dynamic_stiffness(mass, damping, stiffness, frequency, order):
+def _blocks(matrices: Array, frequency: Array, order: int) -> ComplexArray:
     """`K - Omega^2 M + i Omega C` at the frequencies, or its first or second derivative by Omega; (F, n, n)."""
-    n = mass.shape[0]
-    out = np.empty((frequency.shape[0], n, n), dtype=np.complex128)
+    out = np.empty((len(frequency), *matrices.shape[1:]), dtype=complex)
+    dynamic_stiffness(matrices, frequency, order, out)
+    return out
+
+
+@kernel()
+def dynamic_stiffness(matrices, frequency, order, out):
+    """`K - Omega^2 M + i Omega C`, or its first or second derivative by Omega, into `out` (F, n, n); matrices: M, C,
+    K.
+    """
+    n = matrices.shape[1]
     for f in range(frequency.shape[0]):
         om = frequency[f]
         for i in range(n):
             for j in range(n):
+                mass, damping, stiffness = matrices[0, i, j], matrices[1, i, j], matrices[2, i, j]
                 if order == 0:
-                    out[f, i, j] = complex(stiffness[i, j] - om * om * mass[i, j], om * damping[i, j])
+                    out[f, i, j] = complex(stiffness - om * om * mass, om * damping)
                 elif order == 1:
-                    out[f, i, j] = complex(-2.0 * om * mass[i, j], damping[i, j])
+                    out[f, i, j] = complex(-2.0 * om * mass, damping)
                 else:
-                    out[f, i, j] = complex(-2.0 * mass[i, j], 0.0)
-    return out
+                    out[f, i, j] = complex(-2.0 * mass, 0.0)

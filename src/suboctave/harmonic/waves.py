@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -40,13 +40,19 @@ class Frequencies:
         """Those of the operator J_kappa; kappa in rad per time, for Kind.FREE."""
         high = state.basis.harmonics
         if kind is Kind.HALF:
-            return cls(-high - 0.5, 2 * high + 2)
-        return cls(-high + (kappa / state.rate if kind is Kind.FREE else 0.0), 2 * high + 1)
+            return _frequencies(-high - 0.5, 2 * high + 2)
+        return _frequencies(-high + (kappa / state.rate if kind is Kind.FREE else 0.0), 2 * high + 1)
 
     @cached_property
     def values(self) -> Array:
         """All of them, shape (count,)."""
         return np.asarray(self.lowest + np.arange(self.count), dtype=float)
+
+
+@lru_cache(maxsize=256)
+def _frequencies(lowest: float, count: int) -> Frequencies:
+    """The same object for the same frequencies, which keeps their values."""
+    return Frequencies(lowest, count)
 
 
 @dataclass(frozen=True)
@@ -62,7 +68,7 @@ class Waves:
 
         Left vectors are scaled such that `left^H J_kappa right` is the same number in both notations.
         """
-        shaped = np.asarray(vector).reshape(-1, state.balance.size)
+        shaped = vector.reshape(-1, state.balance.size)
         return cls(as_waves(shaped, kind, left), Frequencies.of(state, kind, kappa))
 
     @cached_property
