@@ -113,26 +113,12 @@ class BalanceState:
         self.omega = omega
         self.values = values
         self.rate = omega / balance.basis.nu
-
-    @lazy
-    def frequencies(self) -> Array:
-        """Circular frequencies of the harmonics, shape (H + 1,)."""
-        return self.basis.multiples * self.omega
-
-    @lazy
-    def blocks(self) -> ComplexArray:
-        """A at the harmonics, shape (H + 1, size, size)."""
-        return self.linear.stiffness(self.frequencies)
-
-    @lazy
-    def compliance(self) -> ComplexArray | None:
-        """B at the harmonics, None for the identity."""
-        return self.linear.compliance(self.frequencies)
-
-    @lazy
-    def laws(self) -> Laws:
-        """The laws of all elements."""
-        return self.balance.laws(self.values)
+        #: circular frequencies of the harmonics, (H + 1,)
+        self.frequencies = balance.basis.multiples * omega
+        #: A at the harmonics, (H + 1, size, size), and B, None for the identity
+        self.blocks = linear.stiffness(self.frequencies)
+        self.compliance = linear.compliance(self.frequencies)
+        self.laws: Laws = balance.laws(values)
 
     @property
     def packed(self) -> PackedLaws:
