@@ -60,9 +60,12 @@ def eliminate(a, b):
 
 
 @kernel(fastmath=_FAST, error_model="numpy")
-def _add_product(a, b, out):
-    """Add the matrix product a b to out; zeros of a cost nothing."""
+def _product(a, b, out, fresh):
+    """Add the matrix product a b to out, which is zeroed before if `fresh`; zeros of a cost nothing."""
     for i in range(a.shape[0]):
+        if fresh:
+            for j in range(b.shape[1]):
+                out[i, j] = 0.0
         for k in range(a.shape[1]):
             f = a[i, k]
             if f != 0.0:
@@ -90,17 +93,18 @@ def structure(spans, stiffness, damping, left, right):
     size, forces = 2 * n, groups * m
     columns = size + forces
     out = np.zeros((kinds[-1] + 1, 2 * forces + size, columns))
+    once, rate, twice = np.empty((m, m)), np.empty((m, m)), np.empty((m, m))
+    y, v = np.empty((m, columns)), np.empty((m, columns))
     for p in range(spans.shape[0]):
         d = kinds[p]
         if p > 0 and d == kinds[p - 1]:
             continue
-        once = INTEGRATION * spans[p]
-        rate = ADJOINT * spans[p]
-        twice, time = np.zeros((m, m)), np.zeros(m)
-        _add_product(once, rate, twice)
+        time = np.zeros(m)
         for j in range(m):
             for l in range(m):
+                once[j, l], rate[j, l] = INTEGRATION[j, l] * spans[p, l], ADJOINT[j, l] * spans[p, l]
                 time[j] += once[j, l]
+        _product(once, rate, twice, True)
         # unknowns are the accelerations, mode by mode
         a, b = np.zeros((n * m, n * m)), np.zeros((n * m, columns))
         for i in range(n * m):
@@ -117,9 +121,8 @@ def structure(spans, stiffness, damping, left, right):
                     b[i * m + j, size + g * m + j] = -left[g, i]
         eliminate(a, b)
         for i in range(n):
-            y, v = np.zeros((m, columns)), np.zeros((m, columns))
-            _add_product(twice, b[i * m : i * m + m], y)
-            _add_product(rate, b[i * m : i * m + m], v)
+            _product(twice, b[i * m : i * m + m], y, True)
+            _product(rate, b[i * m : i * m + m], v, True)
             for j in range(m):
                 y[j, i] += 1.0
                 y[j, n + i] += time[j]
@@ -178,17 +181,17 @@ def propagate(kinds, structures, law, base, kick, active, left, right, monodromy
                     values[part, g * m + j] = law[channel, part, at + j]
                 values[1, g * m + j] += base[channel, p]
         if forced:
-            lower[:] = 0.0
             for row in range(forces):
                 g, j = row // m, row % m
-                for i in range(m):
-                    for part in range(3):
-                        lower[part, row] += values[part, g * m + i] * LOWER[i, j]
+                for part in range(3):
+                    value = 0.0
+                    for i in range(m):
+                        value += values[part, g * m + i] * LOWER[i, j]
+                    lower[part, row] = value
             values, lower = lower, values
         r, k, c = values[0], values[1], values[2]
         one = structures[kinds[p]]
-        free[:] = 0.0
-        _add_product(one[: 2 * forces, :size], total, free)
+        _product(one[: 2 * forces, :size], total, free, True)
         for row in range(forces):
             for l in range(forces):
                 a[row, l] = -k[row] * one[row, size + l] - c[row] * one[forces + row, size + l]
@@ -199,13 +202,12 @@ def propagate(kinds, structures, law, base, kick, active, left, right, monodromy
                 f[row, size] += r[row]
         eliminate(a, f)
         if forced:
-            _add_product(one[: 2 * forces, size:], f, free)
+            _product(one[: 2 * forces, size:], f, free, False)
             for row in range(2 * forces):
                 for l in range(columns):
                     nodes[p, row, l] = free[row, l]
-        end[:] = 0.0
-        _add_product(one[2 * forces :, :size], total, end)
-        _add_product(one[2 * forces :, size:], f, end)
+        _product(one[2 * forces :, :size], total, end, True)
+        _product(one[2 * forces :, size:], f, end, False)
         total, end = end, total
     for i in range(size):
         for j in range(size):
@@ -301,19 +303,20 @@ def multipliers_and_shifts(real, imaginary, left, right, phi, before, mu, moved)
             moved[j] = moved[j - 1]
             continue
         more = j + 1 if imaginary[j] > 0.0 else j
-        u = left[:, j] + (0.0 if more == j else 1.0j) * left[:, more]
-        v = right[:, j] + (0.0 if more == j else 1.0j) * right[:, more]
+        turn = 0.0 if more == j else 1.0
         by_change = scale = 0.0j
         by_rounding = 0.0
         for i in range(size):
             changed = 0.0j
             rounded = 0.0
             for q in range(size):
-                changed += (phi[i, q] - before[i, q]) * v[q]
-                rounded += abs(phi[i, q]) * abs(v[q])
-            scale += u[i].conjugate() * v[i]
-            by_change += u[i].conjugate() * changed
-            by_rounding += abs(u[i]) * rounded
+                v = complex(right[q, j], turn * right[q, more])
+                changed += (phi[i, q] - before[i, q]) * v
+                rounded += abs(phi[i, q]) * abs(v)
+            u = complex(left[i, j], -turn * left[i, more])
+            scale += u * complex(right[i, j], turn * right[i, more])
+            by_change += u * changed
+            by_rounding += abs(u) * rounded
         first = (abs(by_change) + _ROUNDING * by_rounding) / abs(scale) if abs(scale) > 0.0 else np.inf
         moved[j] = min(first, most) + 1e-14
     for k in range(1, size):

@@ -83,7 +83,10 @@ def events_along(c, pieces, owner, passages, zr, zi):
         g, gap = owner[q], pieces[q, 1]
         if q == 0 or g != owner[q - 1]:
             turns = extrema(c[g], zr, zi)
-            size = turns[1].max() - turns[1].min() if turns.shape[1] > 0 else 0.0
+            highest, lowest = -np.inf, np.inf
+            for j in range(turns.shape[1]):
+                highest, lowest = max(highest, turns[1, j]), min(lowest, turns[1, j])
+            size = highest - lowest if turns.shape[1] > 0 else 0.0
         at, _above = crossings_of(c[g], gap, turns)
         for tau in at:
             _x, d, s = jet(c[g], math.cos(tau), math.sin(tau))
@@ -98,8 +101,8 @@ def events_along(c, pieces, owner, passages, zr, zi):
                 rows[count, 3], rows[count, 4], rows[count, 5] = s, miss, q
                 count += 1
     for i in range(passages.shape[1]):
-        rows[count, 0], rows[count, 1], rows[count, 5] = passages[0, i], passages[1, i], -1.0
-        rows[count, 2:5] = 0.0
+        rows[count, 0], rows[count, 1], rows[count, 2] = passages[0, i], passages[1, i], 0.0
+        rows[count, 3], rows[count, 4], rows[count, 5] = 0.0, 0.0, -1.0
         count += 1
     return rows[:count]
 
@@ -275,10 +278,11 @@ def changed_laws(path, law, change, rate, pieces, owner, polynomial, steps, step
     stiffness k that is as thin is an impulse k t.
     """
     groups, _, total = path.shape
+    moved = np.empty(total)
     for g in range(groups):
         for j in range(total):
-            out[g, 1, j] = law[g, 3, j]
-        add_values(polynomial[g], path[g, 0] + change[g, 0], out[g, 0], out[g, 1])
+            out[g, 1, j], moved[j] = law[g, 3, j], path[g, 0, j] + change[g, 0, j]
+        add_values(polynomial[g], moved, out[g, 0], out[g, 1])
     for s in range(steps.shape[0]):
         g = step_owner[s]
         point, width, k = steps[s, 0], steps[s, 1], steps[s, 2] / math.pi
