@@ -60,12 +60,11 @@ def eliminate(a, b):
 
 
 @kernel(fastmath=_FAST, error_model="numpy")
-def _product(a, b, out, fresh):
-    """Add the matrix product a b to out, which is zeroed before if `fresh`; zeros of a cost nothing."""
+def _product(a, b, kept, out):
+    """The matrix product a b and a share `kept` of out, into out; zeros of a cost nothing."""
     for i in range(a.shape[0]):
-        if fresh:
-            for j in range(b.shape[1]):
-                out[i, j] = 0.0
+        for j in range(b.shape[1]):
+            out[i, j] = kept * out[i, j] if kept != 0.0 else 0.0
         for k in range(a.shape[1]):
             f = a[i, k]
             if f != 0.0:
@@ -104,7 +103,7 @@ def structure(spans, stiffness, damping, left, right):
             for l in range(m):
                 once[j, l], rate[j, l] = INTEGRATION[j, l] * spans[p, l], ADJOINT[j, l] * spans[p, l]
                 time[j] += once[j, l]
-        _product(once, rate, twice, True)
+        _product(once, rate, 0.0, twice)
         # unknowns are the accelerations, mode by mode
         a, b = np.zeros((n * m, n * m)), np.zeros((n * m, columns))
         for i in range(n * m):
@@ -121,8 +120,8 @@ def structure(spans, stiffness, damping, left, right):
                     b[i * m + j, size + g * m + j] = -left[g, i]
         eliminate(a, b)
         for i in range(n):
-            _product(twice, b[i * m : i * m + m], y, True)
-            _product(rate, b[i * m : i * m + m], v, True)
+            _product(twice, b[i * m : i * m + m], 0.0, y)
+            _product(rate, b[i * m : i * m + m], 0.0, v)
             for j in range(m):
                 y[j, i] += 1.0
                 y[j, n + i] += time[j]
@@ -191,7 +190,7 @@ def propagate(kinds, structures, law, base, kick, active, left, right, monodromy
             values, lower = lower, values
         r, k, c = values[0], values[1], values[2]
         one = structures[kinds[p]]
-        _product(one[: 2 * forces, :size], total, free, True)
+        _product(one[: 2 * forces, :size], total, 0.0, free)
         for row in range(forces):
             for l in range(forces):
                 a[row, l] = -k[row] * one[row, size + l] - c[row] * one[forces + row, size + l]
@@ -202,12 +201,12 @@ def propagate(kinds, structures, law, base, kick, active, left, right, monodromy
                 f[row, size] += r[row]
         eliminate(a, f)
         if forced:
-            _product(one[: 2 * forces, size:], f, free, False)
+            _product(one[: 2 * forces, size:], f, 1.0, free)
             for row in range(2 * forces):
                 for l in range(columns):
                     nodes[p, row, l] = free[row, l]
-        _product(one[2 * forces :, :size], total, end, True)
-        _product(one[2 * forces :, size:], f, end, False)
+        _product(one[2 * forces :, :size], total, 0.0, end)
+        _product(one[2 * forces :, size:], f, 1.0, end)
         total, end = end, total
     for i in range(size):
         for j in range(size):
