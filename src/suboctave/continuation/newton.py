@@ -91,7 +91,7 @@ def closely(options: NewtonOptions) -> NewtonOptions:
 def factorised(evaluation: Evaluation, row: Array | None, weights: Array) -> Factor:
     """Factorise `[F_u; row]`, or F_u alone, with columns scaled to arclength."""
     scaled = np.empty((len(weights), len(weights)))
-    np.divide(evaluation.jacobian, weights, out=scaled if row is None else scaled[:-1])
+    np.multiply(evaluation.jacobian, 1.0 / weights, out=scaled if row is None else scaled[:-1])
     if row is not None:
         scaled[-1] = row
     return Factor.of(scaled, overwrite=True)

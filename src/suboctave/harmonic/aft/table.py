@@ -106,6 +106,8 @@ class PackedLaws:
         self.polynomial = np.zeros((len(self.line), max(map(len, polynomials), default=0)))
         for row, polynomial in zip(self.polynomial, polynomials, strict=False):
             row[: len(polynomial)] = polynomial
+        #: directions with a polynomial
+        self._polynomials = [g for g, polynomial in enumerate(polynomials) if polynomial]
         #: direction, steps, and these' places and widths
         self._stepped = [
             (g, rows, rows[:, 0].copy(), rows[:, 1].copy())
@@ -123,8 +125,8 @@ class PackedLaws:
             add_pieces(motions, self.pieces, self.first, grid.zr, grid.zi, table)
         if self.polynomial.shape[1]:
             nodes = polynomial_nodes((self.polynomial.shape[1] - 1) * high, top)
-            for g, c in enumerate(motions):
-                add_smooth(c, self.polynomial[g], NO_ROWS, nodes.zr, nodes.zi, nodes.weights, table[:, g])
+            for g in self._polynomials:
+                add_smooth(motions[g], self.polynomial[g], NO_ROWS, nodes.zr, nodes.zi, nodes.weights, table[:, g])
         for g, steps, places, widths in self._stepped:
             nodes = graded_nodes(motions[g], places, widths, top)
             add_smooth(motions[g], self.line[g], steps, nodes.zr, nodes.zi, nodes.weights, table[:, g])
