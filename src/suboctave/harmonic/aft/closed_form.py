@@ -178,9 +178,9 @@ def add_pieces(motions, pieces, first, zr, zi, table):
 
 
 @kernel()
-def add_smooth(c, polynomial, steps, zr, zi, weights, table):
+def add_smooth(c, polynomial, steps, zr, zi, weights, table, g):
     """Add the Fourier coefficients of a polynomial and of arctan steps (S, 3) along a motion (H + 1,), and of their
-    slope, to `table` (>= 2, top + 1), by nodes and weights on the circle.
+    slope, to direction g of `table` (>= 2, > g, top + 1), by nodes and weights on the circle.
     """
     u = np.empty((1, zr.shape[0]))
     displacement(c, zr, zi, u)
@@ -188,7 +188,7 @@ def add_smooth(c, polynomial, steps, zr, zi, weights, table):
     add_values(polynomial, u[0], values[0], values[1])
     for s in range(steps.shape[0]):
         add_step(u[0], steps[s, 0], steps[s, 1], steps[s, 2] / math.pi, values[0], values[1])
-    sums = spectra(values, weights, zr, zi, table.shape[1] - 1)
-    for q in range(table.shape[1]):
-        table[0, q] += sums[0, q]
-        table[1, q] += sums[1, q]
+    sums = spectra(values, weights, zr, zi, table.shape[2] - 1)
+    for q in range(table.shape[2]):
+        table[0, g, q] += sums[0, q]
+        table[1, g, q] += sums[1, q]

@@ -126,10 +126,10 @@ class PackedLaws:
         if self.polynomial.shape[1]:
             nodes = polynomial_nodes((self.polynomial.shape[1] - 1) * high, top)
             for g in self._polynomials:
-                add_smooth(motions[g], self.polynomial[g], NO_ROWS, nodes.zr, nodes.zi, nodes.weights, table[:, g])
+                add_smooth(motions[g], self.polynomial[g], NO_ROWS, nodes.zr, nodes.zi, nodes.weights, table, g)
         for g, steps, places, widths in self._stepped:
             nodes = graded_nodes(motions[g], places, widths, top)
-            add_smooth(motions[g], self.line[g], steps, nodes.zr, nodes.zi, nodes.weights, table[:, g])
+            add_smooth(motions[g], self.line[g], steps, nodes.zr, nodes.zi, nodes.weights, table, g)
 
 
 def _owners(first: list[int]) -> NDArray[np.int64]:
