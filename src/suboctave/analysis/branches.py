@@ -66,7 +66,8 @@ def frequency_response(
         Highest multiple of omega kept, `"adaptive"`, or an `AdaptiveHarmonics`.
     start
         Chooses among coexisting motions at the first frequency: a `PeriodicOrbit`, a point of a branch, a
-        `Bifurcation`, a state `(x, dx/dt)` of shape (2 n,), or coefficients of shape (2 H + 1, n).
+        `Bifurcation`, a state `(x, dx/dt)` of shape (2 n,), or coefficients of shape (2 H + 1, n). Without it one is
+        looked for from the linear response: of several far from that, rounding may decide which.
     subharmonic
         Period of the motions in periods of the load, where it is not one (or that of `start`): the state or
         coefficients of `start` are then those of a motion of that period. Without `start` one is searched for over the
