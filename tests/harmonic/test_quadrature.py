@@ -11,6 +11,7 @@ from slow import slow
 import suboctave as so
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic import AdaptiveHarmonics, HarmonicBalance, HarmonicBasis
+from suboctave.harmonic.quadrature import graded_nodes, polynomial_nodes
 from suboctave.harmonic.trigonometric import crossings
 from suboctave.model import AdaptiveSampling, CubicSpring, ElasticStop, HarmonicLoad, PolynomialSpring, System, library
 
@@ -109,8 +110,7 @@ def test_polynomial_laws_are_integrated_exactly(powers):
 
 
 def test_weights_add_up_to_the_period():
-    for element in (CubicSpring(0, 1.0), ElasticStop(0, 1.0, 0.4, regularization=1e4)):
-        nodes = channel_of(element, motion_of("rough"), 15).laws[0].nodes
+    for nodes in (polynomial_nodes(21, 15), graded_nodes(motion_of("rough"), np.array([0.4]), np.array([1e-4]), 15)):
         zr, zi = nodes.zr, nodes.zi
         assert nodes.weights.sum() == pytest.approx(2 * np.pi, rel=1e-13)
         assert np.abs(zr**2 + zi**2 - 1.0).max() < 1e-13
@@ -126,7 +126,7 @@ def test_motions_of_few_harmonics_are_integrated_as_well(harmonics, gap):
     c = np.array([0.1] + [0.7 / k**2 * np.exp(1j * k) for k in range(1, harmonics + 1)])
     stop, top = ElasticStop(0, 1.0, gap, side="right", regularization=40.0), 2 * harmonics + 1
     spectra = channel_of(stop, c, top)
-    nodes = spectra.laws[0].nodes
+    nodes = graded_nodes(c, np.array([gap]), np.array([1.0 / 40.0]), top)
     zr, zi = nodes.zr, nodes.zi
     assert np.abs(zr**2 + zi**2 - 1.0).max() < 1e-14
     tau = 2 * np.pi * np.arange(8192) / 8192

@@ -269,7 +269,7 @@ class Channels:
         self._clock = -1
         if not state.packed.whole:
             for g, channel in enumerate(state.channels[: self.first]):
-                own = [law for law in channel.laws if isinstance(law, GeneralLaw) and not law.whole]
+                own = [law for law in channel.laws if isinstance(law, GeneralLaw)]
                 self._laws += [(law, g, np.ones(1)) for law in own]
         for channel in state.own_channels if state.balance.own else ():
             self._add(channel)

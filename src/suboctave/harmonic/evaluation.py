@@ -143,7 +143,10 @@ class BalanceState:
             Along(self.motions[g : g + 1], self.rate, self.basis.nu, group.moving, balance.top)
             for g, group in enumerate(balance.groups)
         ]
-        return [(along, laws_along(along, members)) for along, members in zip(alongs, self.laws.groups, strict=True)]
+        return [
+            (along, laws_along(along, members, self.packed, g))
+            for g, (along, members) in enumerate(zip(alongs, self.laws.groups, strict=True))
+        ]
 
     @lazy
     def channels(self) -> list[Channel]:

@@ -9,17 +9,17 @@ or time has its own.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from suboctave.harmonic.aft.closed_law import ClosedForm
 from suboctave.harmonic.aft.general import GeneralLaw
 from suboctave.harmonic.aft.law import Along, LawAlong, Member, Second, Third
-from suboctave.harmonic.aft.pieces import Pieces
+from suboctave.harmonic.aft.table import PackedLaws
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.lazy import lazy
-from suboctave.model.elements.smoothness import PiecewiseLinear
 
 __all__ = ["Channel", "Group", "laws_along"]
 
@@ -44,12 +44,17 @@ class Group:
     moving: bool
 
 
-def laws_along(along: Along, members: Iterable[Member]) -> list[LawAlong]:
-    """The laws of elements along a motion, those that are integrated alike together."""
+def laws_along(
+    along: Along, members: Sequence[Member], packed: PackedLaws | None = None, direction: int = 0
+) -> list[LawAlong]:
+    """The laws of elements along a motion, those that are integrated alike together; `packed` as in `ClosedForm`."""
+    closed = [member for member in members if member.kind.whole]
+    laws: list[LawAlong] = [ClosedForm(along, closed, packed, direction)] if closed else []
     alike: dict[tuple[type, bool], list[Member]] = {}
     for member in members:
-        alike.setdefault((type(member.kind), member.element.depends_on_velocity), []).append(member)
-    return [(Pieces if kind is PiecewiseLinear else GeneralLaw)(along, own) for (kind, _), own in alike.items()]
+        if not member.kind.whole:
+            alike.setdefault((type(member.kind), member.element.depends_on_velocity), []).append(member)
+    return laws + [GeneralLaw(along, own) for own in alike.values()]
 
 
 class Channel:

@@ -1,4 +1,4 @@
-"""Spectra of force and stiffness of laws known in closed form: piecewise-linear pieces, polynomials, arctan steps.
+"""Spectra and derivatives of laws known in closed form: piecewise-linear pieces, polynomials, arctan steps.
 
 The inverse tangent is arithmetic, which compilers turn into vector instructions where the library's is called number by
 number: beyond tan(pi/8) the argument is taken to `(|x| - 1) / (|x| + 1)`, beyond tan(3 pi/8) to `-1 / |x|`, and
@@ -15,7 +15,7 @@ import math
 import numpy as np
 
 from suboctave.compiled import kernel
-from suboctave.harmonic.trigonometric import FAST, crossings_of, displacement, extrema, spectra
+from suboctave.harmonic.trigonometric import FAST, crossings_of, displacement, extrema, jet, spectra
 
 #: no pieces or steps
 NO_ROWS = np.zeros((0, 3))
@@ -23,6 +23,15 @@ _LOW, _HIGH = math.sqrt(2.0) - 1.0, math.sqrt(2.0) + 1.0
 _P0, _P1, _P2, _P3 = -0.3333333333333333, 0.1999999999999552, -0.14285714284666542, 0.11111111015256361
 _P4, _P5, _P6, _P7 = -0.09090904578123903, 0.07692183190826087, -0.06664511447381948, 0.0585814891280221
 _P8, _P9, _P10 = -0.0508544973794026, 0.03923165829558719, -0.01917688711906226
+
+
+@kernel()
+def least_rate(c):
+    """Rate of a motion (H + 1,) below which it counts as grazing where it reaches a corner."""
+    least = 0.0
+    for k in range(c.shape[0]):
+        least = max(least, abs(c[k]))
+    return max(1e-12 * least, 1e-300)
 
 
 @kernel()
@@ -192,3 +201,74 @@ def add_smooth(c, polynomial, steps, zr, zi, weights, table, g):
     for q in range(table.shape[2]):
         table[0, g, q] += sums[0, q]
         table[1, g, q] += sums[1, q]
+
+
+@kernel()
+def add_changed_pieces(c, pieces, rates, zr, zi, out):
+    """Add what rates of stiffness and gap (P, 2) of piecewise-linear pieces (P, 3) do to the Fourier coefficients of
+    their force and slope along a motion (H + 1,), to `out` (2, top + 1).
+    """
+    top, high = out.shape[1] - 1, c.shape[0] - 1
+    least, turns = least_rate(c), extrema(c, zr, zi)
+    for p in range(pieces.shape[0]):
+        k, gap, side = pieces[p, 0], pieces[p, 1], pieces[p, 2]
+        by_stiffness, shift = rates[p, 0], rates[p, 1] * k
+        crossed, above = crossings_of(c, gap, turns)
+        chi = contact_spectrum(crossed, above, side, top + high)
+        product = product_spectrum(c, gap, chi, top)
+        for q in range(top + 1):
+            out[0, q] += by_stiffness * product[q] - shift * chi[q]
+            out[1, q] += by_stiffness * chi[q]
+        for tau in crossed:
+            z = complex(math.cos(tau), math.sin(tau))
+            _x, speed, _s = jet(c, z.real, z.imag)
+            wave = complex(side * shift / (2.0 * math.pi * max(abs(speed), least)), 0.0)
+            for q in range(top + 1):
+                out[1, q] -= wave
+                wave *= z.conjugate()
+
+
+@kernel()
+def corner_weights(c, pieces, zr, zi):
+    """Instants at which a motion crosses the gaps of piecewise-linear pieces (stiffness, gap, side): cosines, sines,
+    and the weights there of the second derivative, and of the third: regular, and along its slope; (5, N). `f_uu` has
+    `side stiffness / |u'|`, u' kept from zero where the motion grazes.
+    """
+    least, turns = least_rate(c), extrema(c, zr, zi)
+    out, count = np.empty((5, pieces.shape[0] * turns.shape[1])), 0
+    for p in range(pieces.shape[0]):
+        at, _above = crossings_of(c, pieces[p, 1], turns)
+        for tau in at:
+            co, si = math.cos(tau), math.sin(tau)
+            _x, speed, bend = jet(c, co, si)
+            if abs(speed) < least:
+                speed = math.copysign(least, speed)
+            weight = pieces[p, 2] * pieces[p, 0] / abs(speed)
+            out[0, count], out[1, count], out[2, count] = co, si, weight
+            out[3, count], out[4, count] = weight * bend / speed**2, -weight / speed
+            count += 1
+    return out[:, :count].copy()
+
+
+@kernel()
+def smooth_weights(c, polynomial, steps, zr, zi, weights):
+    """Second and third derivative of a polynomial and of arctan steps (S, 3) along a motion (H + 1,) at nodes, times
+    the nodes' weights, (2, N).
+    """
+    u, out = np.empty((1, zr.shape[0])), np.zeros((2, zr.shape[0]))
+    displacement(c, zr, zi, u)
+    second = np.empty(max(0, polynomial.shape[0] - 2))
+    for p in range(second.shape[0]):
+        second[p] = (p + 2) * (p + 1) * polynomial[p + 2]
+    add_values(second, u[0], out[0], out[1])
+    for s in range(steps.shape[0]):
+        width, factor = steps[s, 1], steps[s, 2] / math.pi
+        for j in range(u.shape[1]):
+            ratio = (u[0, j] - steps[s, 0]) / width
+            share = 1.0 / (width * (1.0 + ratio * ratio))
+            out[0, j] += factor * share
+            out[1, j] -= 2.0 * factor * ratio * share * share
+    for j in range(u.shape[1]):
+        out[0, j] *= weights[j]
+        out[1, j] *= weights[j]
+    return out

@@ -210,22 +210,12 @@ class GeneralLaw(LawAlong):
 
     def curvature(self, q: Array, theta: Array) -> Array:
         """f_qq (Q', Q', N) at states, its regular part."""
-        parts = [
-            as_coupled(m.element).curvature(q, theta, m.coefficients)
-            if m.whole is None
-            else m.whole.curvature(q[0], m.coefficients)[None, None]
-            for m in self.members
-        ]
+        parts = [as_coupled(m.element).curvature(q, theta, m.coefficients) for m in self.members]
         return sum(parts[1:], parts[0])
 
     def third_derivative(self, q: Array, theta: Array) -> Array:
         """f_qqq (Q', Q', Q', N) at states, its regular part."""
-        parts = [
-            as_coupled(m.element).third(q, theta, m.coefficients)
-            if m.whole is None
-            else m.whole.third(q[0], m.coefficients)[None, None, None]
-            for m in self.members
-        ]
+        parts = [as_coupled(m.element).third(q, theta, m.coefficients) for m in self.members]
         return sum(parts[1:], parts[0])
 
     def add_spectra(self, out: ComplexArray) -> None:

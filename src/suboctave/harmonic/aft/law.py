@@ -26,11 +26,11 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.model.elements.base import BaseElement
-from suboctave.model.elements.smoothness import Sampling, WholeLaw
+from suboctave.model.elements.smoothness import Sampling
 
 __all__ = ["Along", "CoefficientSpectra", "LawAlong", "LocalMotion", "Member", "Second", "Third"]
 
@@ -45,11 +45,6 @@ class Member(NamedTuple):
     kind: Sampling
     coefficients: Array
     samples: int | None
-
-    @property
-    def whole(self) -> WholeLaw | None:
-        """The law, where its smoothness class is all of it."""
-        return cast("WholeLaw", self.kind) if self.kind.whole else None
 
 
 @dataclass(eq=False)
@@ -141,14 +136,12 @@ class LawAlong(ABC):
     Of q it reads the first entries, Q' in number: the displacements alone, if it does not depend on velocity.
     """
 
+    #: whether the smoothness classes of its elements are all of their laws
+    whole = False
+
     def __init__(self, along: Along, members: Sequence[Member]) -> None:
         self.along = along
         self.members = members
-
-    @property
-    def whole(self) -> bool:
-        """Whether the smoothness classes of its elements are all of their laws."""
-        return all(member.kind.whole for member in self.members)
 
     @abstractmethod
     def add_spectra(self, out: ComplexArray) -> None:

@@ -9,10 +9,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from suboctave.harmonic.aft.closed_form import NO_ROWS, add_pieces, add_smooth
+from suboctave.harmonic.aft.closed_form import NO_ROWS, add_pieces, add_smooth, corner_weights, smooth_weights
 from suboctave.harmonic.aft.law import Member
 from suboctave.harmonic.basis import Array, ComplexArray
-from suboctave.harmonic.quadrature import FEWEST, graded_nodes, polynomial_nodes, search_grid
+from suboctave.harmonic.quadrature import FEWEST, Nodes, graded_nodes, polynomial_nodes, search_grid
 from suboctave.model.elements.smoothness import (
     AdaptiveSampling,
     PiecewiseLinear,
@@ -29,6 +29,18 @@ class Probe(NamedTuple):
     pieces: Array = NO_ROWS
     places: Sequence[float] = ()
     widths: Sequence[float] = ()
+
+
+class Weights(NamedTuple):
+    """Second and third derivative of laws along a motion as weights (N,) at instants; `slope`: the third's along its
+    slope (`law.Third`), None where there is no corner.
+    """
+
+    zr: Array
+    zi: Array
+    second: Array
+    third: Array
+    slope: Array | None = None
 
 
 class PackedLaws:
@@ -106,11 +118,12 @@ class PackedLaws:
         self.polynomial = np.zeros((len(self.line), max(map(len, polynomials), default=0)))
         for row, polynomial in zip(self.polynomial, polynomials, strict=False):
             row[: len(polynomial)] = polynomial
-        #: directions with a polynomial
-        self._polynomials = [g for g, polynomial in enumerate(polynomials) if polynomial]
-        #: direction, steps, and these' places and widths
-        self._stepped = [
-            (g, rows, rows[:, 0].copy(), rows[:, 1].copy())
+        #: direction, polynomial, steps, and these' places and widths, of all laws that are smooth
+        self._smooth: list[tuple[int, Array, Array, tuple[Array, Array] | None]] = [
+            (g, self.polynomial[g], NO_ROWS, None) for g, polynomial in enumerate(polynomials) if polynomial
+        ]
+        self._smooth += [
+            (g, self.line[g], rows, (rows[:, 0].copy(), rows[:, 1].copy()))
             for g, (low, high) in enumerate(pairwise(step_first))
             if len(rows := self.steps[low:high])
         ]
@@ -119,17 +132,34 @@ class PackedLaws:
         """Add the Fourier coefficients of the laws known in closed form along motions (G, H + 1), and of their slopes,
         to `table` (>= 2, >= G, top + 1).
         """
-        high, top = motions.shape[1] - 1, table.shape[2] - 1
         if len(self.pieces):
-            grid = search_grid(high)
+            grid = search_grid(motions.shape[1] - 1)
             add_pieces(motions, self.pieces, self.first, grid.zr, grid.zi, table)
-        if self.polynomial.shape[1]:
-            nodes = polynomial_nodes((self.polynomial.shape[1] - 1) * high, top)
-            for g in self._polynomials:
-                add_smooth(motions[g], self.polynomial[g], NO_ROWS, nodes.zr, nodes.zi, nodes.weights, table, g)
-        for g, steps, places, widths in self._stepped:
-            nodes = graded_nodes(motions[g], places, widths, top)
-            add_smooth(motions[g], self.line[g], steps, nodes.zr, nodes.zi, nodes.weights, table, g)
+        for g, polynomial, steps, sharp in self._smooth:
+            nodes = _nodes(motions[g], polynomial, sharp, table.shape[2] - 1)
+            add_smooth(motions[g], polynomial, steps, nodes.zr, nodes.zi, nodes.weights, table, g)
+
+    def weights(self, direction: int, motion: ComplexArray, top: int) -> list[Weights]:
+        """Second and third derivatives along the motion (H + 1,) in a direction, good for Fourier coefficients up to
+        `top`.
+        """
+        parts, pieces = [], self.pieces[self.first[direction] : self.first[direction + 1]]
+        if len(pieces):
+            grid = search_grid(len(motion) - 1)
+            parts.append(Weights(*corner_weights(motion, pieces, grid.zr, grid.zi)))
+        for g, polynomial, steps, sharp in self._smooth:
+            if g == direction and (len(polynomial) > 2 or len(steps)):
+                nodes = _nodes(motion, polynomial, sharp, top)
+                both = smooth_weights(motion, polynomial, steps, nodes.zr, nodes.zi, nodes.weights)
+                parts.append(Weights(nodes.zr, nodes.zi, *both))
+        return parts
+
+
+def _nodes(motion: ComplexArray, polynomial: Array, sharp: tuple[Array, Array] | None, top: int) -> Nodes:
+    """Nodes for a polynomial, or for steps with these places and widths."""
+    if sharp is None:
+        return polynomial_nodes((len(polynomial) - 1) * (len(motion) - 1), top)
+    return graded_nodes(motion, *sharp, top)
 
 
 def _owners(first: list[int]) -> NDArray[np.int64]:
