@@ -26,15 +26,6 @@ _P8, _P9, _P10 = -0.0508544973794026, 0.03923165829558719, -0.01917688711906226
 
 
 @kernel()
-def least_rate(c):
-    """Rate of a motion (H + 1,) below which it counts as grazing where it reaches a corner."""
-    least = 0.0
-    for k in range(c.shape[0]):
-        least = max(least, abs(c[k]))
-    return max(1e-12 * least, 1e-300)
-
-
-@kernel()
 def contact_spectrum(tau, above, side, top):
     """Fourier coefficients q = 0 .. top of the indicator of `side * (x - level) > 0`, from the crossings of `level`.
 
@@ -204,37 +195,15 @@ def add_smooth(c, polynomial, steps, zr, zi, weights, table, g):
 
 
 @kernel()
-def add_changed_pieces(c, pieces, rates, zr, zi, out):
-    """Add what rates of stiffness and gap (P, 2) of piecewise-linear pieces (P, 3) do to the Fourier coefficients of
-    their force and slope along a motion (H + 1,), to `out` (2, top + 1).
-    """
-    top, high = out.shape[1] - 1, c.shape[0] - 1
-    least, turns = least_rate(c), extrema(c, zr, zi)
-    for p in range(pieces.shape[0]):
-        k, gap, side = pieces[p, 0], pieces[p, 1], pieces[p, 2]
-        by_stiffness, shift = rates[p, 0], rates[p, 1] * k
-        crossed, above = crossings_of(c, gap, turns)
-        chi = contact_spectrum(crossed, above, side, top + high)
-        product = product_spectrum(c, gap, chi, top)
-        for q in range(top + 1):
-            out[0, q] += by_stiffness * product[q] - shift * chi[q]
-            out[1, q] += by_stiffness * chi[q]
-        for tau in crossed:
-            z = complex(math.cos(tau), math.sin(tau))
-            _x, speed, _s = jet(c, z.real, z.imag)
-            wave = complex(side * shift / (2.0 * math.pi * max(abs(speed), least)), 0.0)
-            for q in range(top + 1):
-                out[1, q] -= wave
-                wave *= z.conjugate()
-
-
-@kernel()
 def corner_weights(c, pieces, zr, zi):
     """Instants at which a motion crosses the gaps of piecewise-linear pieces (stiffness, gap, side): cosines, sines,
     and the weights there of the second derivative, and of the third: regular, and along its slope; (5, N). `f_uu` has
     `side stiffness / |u'|`, u' kept from zero where the motion grazes.
     """
-    least, turns = least_rate(c), extrema(c, zr, zi)
+    least, turns = 0.0, extrema(c, zr, zi)
+    for k in range(c.shape[0]):
+        least = max(least, abs(c[k]))
+    least = max(1e-12 * least, 1e-300)
     out, count = np.empty((5, pieces.shape[0] * turns.shape[1])), 0
     for p in range(pieces.shape[0]):
         at, _above = crossings_of(c, pieces[p, 1], turns)
@@ -248,6 +217,28 @@ def corner_weights(c, pieces, zr, zi):
             out[3, count], out[4, count] = weight * bend / speed**2, -weight / speed
             count += 1
     return out[:, :count].copy()
+
+
+@kernel()
+def add_changed_pieces(c, pieces, rates, zr, zi, out):
+    """Add what rates of stiffness and gap (P, 2) of piecewise-linear pieces (P, 3) do to the Fourier coefficients of
+    their force and slope along a motion (H + 1,), to `out` (2, top + 1).
+    """
+    top, high, turns, moved = out.shape[1] - 1, c.shape[0] - 1, extrema(c, zr, zi), pieces.copy()
+    for p in range(pieces.shape[0]):
+        by_stiffness, gap, side = rates[p, 0], pieces[p, 1], pieces[p, 2]
+        moved[p, 0] = shift = rates[p, 1] * pieces[p, 0]
+        crossed, above = crossings_of(c, gap, turns)
+        chi = contact_spectrum(crossed, above, side, top + high)
+        product = product_spectrum(c, gap, chi, top)
+        for q in range(top + 1):
+            out[0, q] += by_stiffness * product[q] - shift * chi[q]
+            out[1, q] += by_stiffness * chi[q]
+    # of the slope, the jump at every crossing comes later
+    at = corner_weights(c, moved, zr, zi)
+    comb = spectra(np.ones((1, at.shape[1])), at[2], at[0], at[1], top)
+    for q in range(top + 1):
+        out[1, q] -= comb[0, q]
 
 
 @kernel()
