@@ -1,3 +1,9 @@
-"""Experiments in time: trajectories, sections, brute force, exponents, basins, stepped sine, measured curves."""
+"""Experiments in time: verbs that integrate, their results, and the codecs of these."""
 
-from suboctave.experiments import files as files
+from suboctave.experiments import (
+    basins as basins,
+    brute_force as brute_force,
+    lyapunov_map as lyapunov_map,
+    stepped_sine as stepped_sine,
+    trajectories as trajectories,
+)

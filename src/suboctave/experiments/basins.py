@@ -12,7 +12,7 @@ import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Unpack
+from typing import Annotated, Any, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,12 +28,9 @@ from suboctave.model.system import System, describe
 from suboctave.options import with_options
 from suboctave.progress import reporting
 from suboctave.store.journal import Journal, Record
-from suboctave.store.plain import from_json, padded, to_json
+from suboctave.store.plain import Recorded, from_json, padded, to_json
 from suboctave.timedomain.flow import Flow, Motions, Report, check_extent
-
-if TYPE_CHECKING:
-    import pandas
-    import xarray
+from suboctave.timedomain.trapping import Trap
 
 APERIODIC, GONE, OPEN = -1, -2, -3
 #: states followed together; cells of the coarse sample along each side; stopped trajectories that are followed on
@@ -64,6 +61,8 @@ class Basins(TimeResult):
     followed, contradicted
         How many of the trajectories that were stopped early were followed to the end, and how many of those did not
         end where they were said to.
+
+    The table has one row for each label that occurs: name, period, amplitude, share and its errors.
     """
 
     contents = "basins"
@@ -126,34 +125,48 @@ class Basins(TimeResult):
         label = int(self.labels[places[1], places[0]])
         return self.attractors[label] if label >= 0 else None
 
-    def to_xarray(self) -> xarray.Dataset:
-        """Labels and settling times on (y, x), and the attractors."""
+    def _derived(self) -> Mapping[str, Any]:
         known, one = self.attractors, ("attractor",)
         points = np.vstack([np.zeros((0, 2 * self.system.n)), *(one.points for one in known)])
-        variables = {
+        errors = {"standard_error": self.standard_errors, "grid_error": self.grid_errors}
+        return {
             "period": (one, np.array([one.period for one in known], dtype=int)),
             "amplitude": (one, np.array([one.amplitude for one in known])),
             "given": (one, np.array([one.given for one in known], dtype=bool)),
             "multipliers": (("attractor", "multiplier"), padded([one.multipliers for one in known], complex)),
             "points": (("section", "state"), points),
             "point_of": (("section",), np.repeat(np.arange(len(known)), [one.period for one in known]).astype(int)),
+            **{name: ("kind", np.array(list(by.values()))) for name, by in ({"share": self.shares} | errors).items()},
+            "attractor": ("attractor", np.array([one.name for one in known], dtype=str)),
+            "kind": ("kind", np.array(list(self.shares), dtype=str)),
+            "plane_x": self.plane[0],
+            "plane_y": self.plane[1],
         }
-        for name, by_kind in (
-            ("share", self.shares), ("standard_error", self.standard_errors), ("grid_error", self.grid_errors)
-        ):  # fmt: skip
-            variables[name] = ("kind",), np.array(list(by_kind.values()))
-        coordinates = {"attractor": [one.name for one in known], "kind": list(self.shares)}
-        return self._dataset(variables, coordinates, {"plane_x": self.plane[0], "plane_y": self.plane[1]})
 
-    def to_dataframe(self) -> pandas.DataFrame:
-        """One row for each label that occurs: name, period, amplitude, share and its errors."""
-        import pandas as pd
+    def _recorded(self) -> Mapping[str, Any]:
+        return {"traps": [[tuple(vars(trap).values()) for trap in one.traps] for one in self.attractors]}
 
+    @classmethod
+    def _from_record(cls, stored: Recorded) -> Mapping[str, Any]:
+        columns = [stored[name].tolist() for name in ("attractor", "period", "amplitude", "given")]
+        known = [
+            BasinAttractor(
+                str(name), int(period), stored["points"][stored["point_of"] == i], float(amplitude),
+                stored["multipliers"][i].copy(), bool(given), [Trap(*trap) for trap in traps],
+            )
+            for i, (name, period, amplitude, given, traps) in enumerate(
+                zip(*columns, stored.record["traps"], strict=True)
+            )
+        ]  # fmt: skip
+        attributes = stored.dataset.attrs
+        return {"attractors": known, "plane": (str(attributes["plane_x"]), str(attributes["plane_y"]))}
+
+    def _columns(self) -> Mapping[str, Any]:
         known = {one.name: (one.period, one.amplitude) for one in self.attractors}
-        motions = [(name, *known.get(name, (0, np.nan))) for name in self.shares]
-        errors = {"standard_error": self.standard_errors.values(), "grid_error": self.grid_errors.values()}
-        frame = pd.DataFrame(motions, columns=["name", "period", "amplitude"])
-        return frame.assign(share=self.shares.values(), **errors)
+        motions = [known.get(name, (0, np.nan)) for name in self.shares]
+        by_name = {"share": self.shares, "standard_error": self.standard_errors, "grid_error": self.grid_errors}
+        own = {"name": list(self.shares), "period": [p for p, _ in motions], "amplitude": [a for _, a in motions]}
+        return own | {name: list(values.values()) for name, values in by_name.items()}
 
     def plot(self, path: Any = None, **options: Any) -> Any:
         """The plane in one colour for each attractor, stroboscopic points marked; saved if a path is given.

@@ -7,10 +7,10 @@ these is left out.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Annotated, Any, Unpack
+from typing import Annotated, Any, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,10 +37,6 @@ from suboctave.progress import Report, reporting
 from suboctave.store.layout import parameter_column
 from suboctave.timedomain.flow import Flow, Motions, check_extent
 
-if TYPE_CHECKING:
-    import pandas
-    import xarray
-
 _CARRIED = ("up", "down")
 _STARTS = (*_CARRIED, "rest")
 
@@ -61,6 +57,8 @@ class BruteForceDiagram(TimeResult):
         (S, V, P, n): the largest |x_i| in the period before each point.
     complete
         False where an interruption (Ctrl-C) left values out.
+
+    The table has one row per value and start: what was varied, start, period, amplitude, defect of the repetition.
     """
 
     contents = "brute force"
@@ -107,16 +105,10 @@ class BruteForceDiagram(TimeResult):
             raise InputError(f"there is no start {start!r}{suggest(str(start), self.starts)}")
         return self.attractors[self.starts.index(start)]
 
-    def to_xarray(self) -> xarray.Dataset:
-        """Points on (start, value, section, dof), periods and amplitudes on (start, value)."""
-        axes = ("start", "value")
-        variables = {"period": (axes, self.period), "amplitude": (axes, self.amplitude)}
-        return self._dataset(variables, attributes={} if self.omega is None else {"omega": self.omega})
+    def _derived(self) -> Mapping[str, Any]:
+        return {"period": (("start", "value"), self.period), "amplitude": (("start", "value"), self.amplitude)}
 
-    def to_dataframe(self) -> pandas.DataFrame:
-        """One row per value and start: what was varied, start, period, amplitude, defect of the repetition."""
-        import pandas as pd
-
+    def _columns(self) -> Mapping[str, Any]:
         rows = [
             (float(value), start, one.kind, one.period, one.amplitude, one.defect)
             for start, row in zip(self.starts, self.attractors, strict=True)
@@ -124,7 +116,8 @@ class BruteForceDiagram(TimeResult):
             if one is not None
         ]
         own = ("start", "kind", "period", "amplitude", "defect")
-        return pd.DataFrame(rows, columns=[parameter_column(self.name, own), *own])
+        columns = zip(*rows, strict=True) if rows else [()] * (len(own) + 1)
+        return dict(zip((parameter_column(self.name, own), *own), columns, strict=True))
 
     def plot(self, path: Any = None, curves: Any = None, **options: Any) -> Any:
         """Draw the motions, one colour for each period, over branches if any are given; saved to a path.

@@ -4,9 +4,9 @@ and results that can be saved, loaded and written as a table.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeAlias, get_args, get_origin, get_type_hints
 
@@ -19,8 +19,8 @@ from suboctave.model.elements.coupled import as_coupled
 from suboctave.model.inputs import check_count, check_is_system, check_parameter, check_range, observed_dof
 from suboctave.model.system import System
 from suboctave.options import RunOptions
-from suboctave.store.plain import flat
-from suboctave.store.registry import Stored
+from suboctave.store.plain import Recorded, flat, recorded, written_system
+from suboctave.store.registry import Codec, Datasets, Stored, register
 from suboctave.store.table import Table, write_csv
 from suboctave.timedomain.flow import METHODS, Flow
 from suboctave.timedomain.layout import Layout as StateLayout
@@ -221,45 +221,50 @@ class StatesOn(On):
     """The axes of states (..., 2n), which are two variables of the dataset: displacement and velocity."""
 
 
-@dataclass(frozen=True)
-class Entry:
-    """A field of a result, of this `kind`, in its dataset: on axes, or as an attribute."""
-
-    field: str
-    kind: Any
-    name: str
-    axes: tuple[str, ...] = ()
-    states: bool = False
-
-
-def entries_of(made: Any) -> list[Entry]:
+def _entries(made: Any) -> Iterator[tuple[str, Any, On]]:
     """Where the fields of a class of results lie: arrays on their axes, numbers and texts as attributes."""
-    known = []
     for name, hint in get_type_hints(made, include_extras=True).items():
         kind, *places = get_args(hint) if get_origin(hint) is Annotated else (hint,)
-        if places or (kind in (int, float, bool, str) and name != "seconds"):
-            place = places[0] if places else On()
-            known.append(Entry(name, kind, place.name or name, place.axes, isinstance(place, StatesOn)))
-    return known
+        if places or (kind in (int, float, bool, str, float | None) and name != "seconds"):
+            yield name, kind, places[0] if places else On()
 
 
-class TimeResult(Stored, ABC):
+class TimeResult(Stored):
     """A result of time integration: trajectories, sections, diagrams, exponents, basins, tests, verifications.
 
-    `contents` says in files what it is, and `picture` which function of `pictures.in_time` draws it.
+    `contents` says in files what it is, and `picture` which function of `pictures.in_time` draws it. Fields that say
+    where they lie in the dataset are written and read by that; what follows from them is `_derived`, and what has no
+    place there goes through the record of a file: `_recorded`, with dataclasses among `in_record`, and `_from_record`.
     """
 
     contents: ClassVar[str]
     picture: ClassVar[str]
+    in_record: ClassVar[Mapping[str, type]] = {}
     system: System
 
-    def to_xarray(self) -> xarray.Dataset:
-        """The result as a labelled dataset, with what produced it."""
-        return self._dataset()
+    def __init_subclass__(cls) -> None:
+        if "contents" in cls.__dict__:
+            register(Codec(cls.contents, cls, _write, partial(_read, cls)))
 
-    @abstractmethod
     def to_dataframe(self) -> pandas.DataFrame:
-        """The result as a table."""
+        """The result as a table; the class says what its rows are."""
+        import pandas as pd
+
+        return pd.DataFrame(self._columns())
+
+    def _columns(self) -> Mapping[str, Any]:
+        raise NotImplementedError
+
+    def _derived(self) -> Mapping[str, Any]:
+        """Variables `(axes, values)` and attributes of the dataset that are no fields."""
+        return {}
+
+    def _recorded(self) -> Mapping[str, Any]:
+        return {}
+
+    @classmethod
+    def _from_record(cls, stored: Recorded) -> Mapping[str, Any]:
+        return {}
 
     def to_csv(self, path: str | Path, overwrite: bool = False) -> Path:
         """The table as comma-separated text (.csv)."""
@@ -277,34 +282,57 @@ class TimeResult(Stored, ABC):
 
         return getattr(in_time, self.picture)(self.to_xarray(), path, **options)
 
-    def _dataset(
-        self,
-        variables: Mapping[str, Any] | None = None,
-        coordinates: Mapping[str, Any] | None = None,
-        attributes: Mapping[str, Any] | None = None,
-    ) -> xarray.Dataset:
-        """A dataset of all fields that have a place in one, of what is given besides, and of what produced it."""
+    def to_xarray(self) -> xarray.Dataset:
+        """The result as a labelled dataset, with what produced it (variables: docs/results.md)."""
         import xarray
 
         n, values = self.system.n, getattr(self, "parameters", self.system.parameters)
         arrays: dict[str, Any] = {}
         own: dict[str, Any] = {}
-        for entry in entries_of(type(self)):
-            value = getattr(self, entry.field)
-            if entry.states:
+        for field, _, place in _entries(type(self)):
+            value = getattr(self, field)
+            if isinstance(place, StatesOn):
                 parts = {"displacement": value[..., :n], "velocity": value[..., n:]}
-                arrays |= {name: ((*entry.axes, "dof"), part) for name, part in parts.items()}
-            elif entry.axes:
-                arrays[entry.name] = entry.axes, value
-            else:
-                own[entry.name] = int(value) if isinstance(value, bool) else value
-        arrays |= {"parameters": (("parameter",), np.array(list(values.values()), dtype=float)), **(variables or {})}
+                arrays |= {name: ((*place.axes, "dof"), part) for name, part in parts.items()}
+            elif place.axes:
+                arrays[place.name or field] = place.axes, value
+            elif value is not None:
+                own[place.name or field] = int(value) if isinstance(value, bool) else value
+        arrays["parameters"] = ("parameter",), np.array(list(values.values()), dtype=float)
+        for name, value in self._derived().items():
+            (arrays if isinstance(value, tuple) else own)[name] = value
         produced = {"dofs": n, "system": self.system.name, "suboctave": __version__}
-        dataset = xarray.Dataset(
-            dict(flat(arrays)),
-            coords={**(coordinates or {}), "parameter": list(values)},
-            attrs={"contents": self.contents, **own, **(attributes or {}), **produced},
-        )
+        attributes = {"contents": self.contents, **own, **produced}
+        dataset = xarray.Dataset(dict(flat(arrays)), coords={"parameter": list(values)}, attrs=attributes)
         if "dof" in dataset.dims:
             dataset = dataset.assign_coords(dof=list(self.system.dof_names or range(n)))
         return dataset
+
+
+# ------------------------------------------------------------------------------------------------------------- files
+def _write(item: TimeResult) -> dict[str, xarray.Dataset]:
+    """The dataset of `to_xarray`, and besides `record`: JSON with the system and what is no array."""
+    system, arrays = written_system(item.system)
+    record = {"system": system, "seconds": float(item.seconds), **item._recorded()}
+    return {"": recorded(item.to_xarray(), record, "the system and what is no array, as JSON", arrays)}
+
+
+def _read(made: Any, groups: Datasets, allow_code: bool, linear: Any) -> TimeResult:
+    """The result that `_write` wrote, equal bit for bit; what follows from its numbers is computed when needed."""
+    stored = Recorded(groups[""], allow_code, made.in_record)
+    given: dict[str, Any] = {}
+    for field, kind, place in _entries(made):
+        name = place.name or field
+        if isinstance(place, StatesOn):
+            given[field] = np.concatenate([stored["displacement"], stored["velocity"]], axis=-1)
+        elif place.axes:
+            given[field] = stored[name] if stored[name].dtype.kind not in "OU" else tuple(map(str, stored[name]))
+        elif kind == float | None:
+            given[field] = float(stored.dataset.attrs[name]) if name in stored.dataset.attrs else None
+        else:
+            given[field] = kind(stored.dataset.attrs[name])
+    if "parameters" in made.__annotations__:
+        given["parameters"] = dict(zip(map(str, stored["parameter"]), stored["parameters"].tolist(), strict=True))
+    result: TimeResult = made(**given, **made._from_record(stored), system=stored.system(stored.record["system"]))
+    result.seconds = float(stored.record["seconds"])
+    return result

@@ -23,7 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Unpack, overload
+from typing import Annotated, Any, ClassVar, Literal, Unpack, overload
 
 import numpy as np
 
@@ -35,11 +35,8 @@ from suboctave.model.inputs import check_count, check_omega, start_state, timed
 from suboctave.model.system import System
 from suboctave.options import with_options
 from suboctave.progress import reporting
+from suboctave.store.plain import Recorded
 from suboctave.timedomain.flow import METHODS, Flow, Motions, Report, check_extent
-
-if TYPE_CHECKING:
-    import pandas
-    import xarray
 
 #: how far from the first trajectory the others begin, in sizes of the motion
 _APART = 1e-3
@@ -71,8 +68,8 @@ class LyapunovExponents(TimeResult):
     smooth
         Whether smooth weights gave the smaller standard errors.
 
-    `plot` draws the running averages over the periods, with a band of two standard errors; options are those of
-    `pictures.plot_lyapunov`: `count`, `title`, `size`.
+    The table has one row per exponent. `plot` draws the running averages over the periods, with a band of two standard
+    errors; options are those of `pictures.plot_lyapunov`: `count`, `title`, `size`.
     """
 
     contents = "lyapunov exponents"
@@ -128,17 +125,13 @@ class LyapunovExponents(TimeResult):
         k = int(np.flatnonzero(total < 0.0)[0])
         return float(k + total[k - 1] / abs(self.exponents[k]))
 
-    def to_xarray(self) -> xarray.Dataset:
-        """Exponents with their errors, what trajectories and stretches give, the running averages."""
-        return self._dataset(coordinates={"period": np.arange(1, len(self.running) + 1)})
+    def _derived(self) -> Mapping[str, Any]:
+        return {"period": ("period", np.arange(1, len(self.running) + 1))}
 
-    def to_dataframe(self) -> pandas.DataFrame:
-        """One row for each exponent."""
-        import pandas as pd
-
-        return pd.DataFrame({
+    def _columns(self) -> Mapping[str, Any]:
+        return {
             "exponent": self.exponents, "standard_error": self.standard_errors, "per_period": self.per_period,
-        })  # fmt: skip
+        }  # fmt: skip
 
     def __repr__(self) -> str:
         values = ", ".join(
@@ -390,19 +383,21 @@ class Separation(TimeResult):
     rates
         (S,): the exponent by each setting, natural logarithm per unit of time; NaN where the two did not part by a
         factor of ten.
-    settings
-        (S, 2): steps per period or tolerance, and offset.
+    value, offset
+        (S,): steps per period or tolerance, and offset; both in `settings` (S, 2).
     time, distance
         (P + 1,) and (S, P + 1): the distance at phase 0 of the load, displacements by omega times their value.
 
-    `plot` draws the distances over time, and their mean rate; options are those of `pictures.plot_separation`: `most`,
-    `title`, `size`.
+    The table has one row per setting. `plot` draws the distances over time, and their mean rate; options are those of
+    `pictures.plot_separation`: `most`, `title`, `size`.
     """
 
     contents = "separation"
     picture = "plot_separation"
+    in_record: ClassVar[Mapping[str, type]] = {"TwoTrajectories": TwoTrajectories}
     rates: Annotated[Array, On("setting", name="rate")]
-    settings: Array
+    value: Annotated[Array, On("setting")]
+    offset: Annotated[Array, On("setting")]
     time: Annotated[Array, On("time")]
     distance: Annotated[Array, On("setting", "time")]
     omega: float
@@ -422,23 +417,25 @@ class Separation(TimeResult):
         kept = self.rates[np.isfinite(self.rates)]
         return float(kept.std(ddof=1)) if len(kept) > 1 else np.nan
 
-    def to_xarray(self) -> xarray.Dataset:
-        """Rates and settings, distances over time."""
-        variables = {"value": (("setting",), self.settings[:, 0]), "offset": (("setting",), self.settings[:, 1])}
-        attributes = {
-            "exponent": self.exponent,
-            "spread": self.spread,
-            "integrator": self.method.integrator,
-            "saturation": self.method.saturation,
-        }
-        return self._dataset(variables, attributes=attributes)
+    @property
+    def settings(self) -> Array:
+        """Both numbers of each setting, (S, 2)."""
+        return np.column_stack([self.value, self.offset])
 
-    def to_dataframe(self) -> pandas.DataFrame:
-        """One row per setting: steps per period or tolerance, offset, exponent."""
-        import pandas as pd
+    def _derived(self) -> Mapping[str, Any]:
+        own = {"exponent": self.exponent, "spread": self.spread}
+        return own | {name: getattr(self.method, name) for name in ("integrator", "saturation")}
 
+    def _recorded(self) -> Mapping[str, Any]:
+        return {"method": self.method}
+
+    @classmethod
+    def _from_record(cls, stored: Recorded) -> Mapping[str, Any]:
+        return {"method": stored.record["method"]}
+
+    def _columns(self) -> Mapping[str, Any]:
         setting = "steps_per_period" if self.method.integrator == "newmark" else "tolerance"
-        return pd.DataFrame({setting: self.settings[:, 0], "offset": self.settings[:, 1], "exponent": self.rates})
+        return {setting: self.value, "offset": self.offset, "exponent": self.rates}
 
     def __repr__(self) -> str:
         low, high = np.nanpercentile(self.rates, [5, 95]) if np.isfinite(self.rates).any() else (np.nan, np.nan)
@@ -483,9 +480,9 @@ def separate(
     distance = np.concatenate(distances)
     if n and not np.isfinite(distance).all():
         raise ConvergenceError("the motion leaves the range of numbers: it grows without bound")
-    rows = np.array([(float(setting), offset) for setting in settings for offset in offsets])
+    used, added = np.repeat(np.array(settings, dtype=float), len(offsets)), np.tile(offsets, len(settings))
     parameters = {**system.parameters, **values}
-    return Separation(np.array(rates), rows, time, distance, float(omega), parameters, how, system)
+    return Separation(np.array(rates), used, added, time, distance, float(omega), parameters, how, system)
 
 
 def _slope(time: Array, distance: Array, limit: float) -> float:

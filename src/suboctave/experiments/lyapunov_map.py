@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, Protocol, Unpack, runtime_checkable
+from typing import Annotated, Any, Protocol, Unpack, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,10 +26,6 @@ from suboctave.options import with_options
 from suboctave.progress import reporting
 from suboctave.store.layout import parameter_column
 from suboctave.timedomain.flow import Flow, check_extent
-
-if TYPE_CHECKING:
-    import pandas
-    import xarray
 
 #: stretches that one trajectory is cut into
 _STRETCHES = 8
@@ -64,6 +60,8 @@ class LyapunovMap(TimeResult):
         (V, W): from eight stretches of the one trajectory.
     complete
         False where an interruption (Ctrl-C) left points out.
+
+    The table has one row per point.
     """
 
     contents = "lyapunov map"
@@ -84,18 +82,14 @@ class LyapunovMap(TimeResult):
         with np.errstate(invalid="ignore"):
             return self.exponent > np.maximum(_SURE * self.standard_error, _LEAST * self.omega)
 
-    def to_xarray(self) -> xarray.Dataset:
-        """Exponent, its standard error and what counts as chaos on (value, omega)."""
-        return self._dataset({"chaotic": (("value", "omega"), self.chaotic)})
+    def _derived(self) -> Mapping[str, Any]:
+        return {"chaotic": (("value", "omega"), self.chaotic)}
 
-    def to_dataframe(self) -> pandas.DataFrame:
-        """One row per point: frequency, value, exponent, its standard error, whether it counts as chaos."""
-        import pandas as pd
-
+    def _columns(self) -> Mapping[str, Any]:
         value, omega = np.meshgrid(self.values, self.omega, indexing="ij")
         own = {"exponent": self.exponent, "standard_error": self.standard_error, "chaotic": self.chaotic}
         columns = {"omega": omega, parameter_column(self.name, own): value, **own}
-        return pd.DataFrame({name: table.ravel() for name, table in columns.items()})
+        return {name: table.ravel() for name, table in columns.items()}
 
     def plot(self, path: Any = None, curves: Any = (), **options: Any) -> Any:
         """The map in colours, tracked curves of bifurcations over it if any are given; saved if a path is given.

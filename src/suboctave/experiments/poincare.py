@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, Any, Unpack
+from typing import Annotated, Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,12 +17,9 @@ from suboctave.model.system import System
 from suboctave.options import with_options
 from suboctave.progress import reporting
 from suboctave.store.layout import parameter_column
+from suboctave.store.plain import Recorded
 from suboctave.timedomain.flow import Flow
 from suboctave.timedomain.period_recognition import extents, period_of, same_cycle
-
-if TYPE_CHECKING:
-    import pandas
-    import xarray
 
 
 @dataclass(eq=False)
@@ -47,8 +44,8 @@ class PoincareSections(TimeResult):
     tolerance
         Relative tolerance of the recognition of periods.
 
-    `plot` draws the points in the plane of displacement and velocity; options are those of `pictures.plot_sections`:
-    `dof`, `title`, `size`.
+    The table has one row per point. `plot` draws the points in the plane of displacement and velocity; options are
+    those of `pictures.plot_sections`: `dof`, `title`, `size`.
     """
 
     contents = "poincare sections"
@@ -103,20 +100,24 @@ class PoincareSections(TimeResult):
         kept = np.flatnonzero(self.finished & ~self.failed)
         return distinct(self.system, [self.attractor(int(i)) for i in kept], self.tolerance)
 
-    def to_xarray(self) -> xarray.Dataset:
-        """Points on (trajectory, section, dof), periods, and what produced them."""
+    def _derived(self) -> Mapping[str, Any]:
         columns = [self.varied.get(name, np.full(len(self), v)) for name, v in self.system.parameters.items()]
         parameters = np.array(columns, dtype=float).reshape(-1, len(self)).T
-        variables = {
+        return {
             "period": (("trajectory",), self.periods),
             "parameters": (("trajectory", "parameter"), parameters),
+            "varied": "\n".join(self.varied),
         }
-        return self._dataset(variables, attributes={"varied": "\n".join(self.varied)})
 
-    def to_dataframe(self) -> pandas.DataFrame:
-        """One row per point: trajectory, what varies, number of the period, state, period of the motion."""
-        import pandas as pd
+    def _recorded(self) -> Mapping[str, Any]:
+        return {"varied": list(self.varied)}
 
+    @classmethod
+    def _from_record(cls, stored: Recorded) -> Mapping[str, Any]:
+        names = stored["parameter"].astype(str).tolist()
+        return {"varied": {name: stored["parameters"][:, names.index(name)].copy() for name in stored.record["varied"]}}
+
+    def _columns(self) -> Mapping[str, Any]:
         count, sections, size = self.points.shape
         names = [f"{kind}_{i}" for kind in "xv" for i in range(size // 2)]
         taken = ("trajectory", "omega", "section", *names, "period")
@@ -125,7 +126,7 @@ class PoincareSections(TimeResult):
         columns |= {n: np.repeat(values, sections) for n, values in varied.items()}
         columns["section"] = np.tile(np.arange(sections), count)
         columns |= {name: self.points[:, :, i].ravel() for i, name in enumerate(names)}
-        return pd.DataFrame(columns | {"period": np.repeat(self.periods, sections)})
+        return columns | {"period": np.repeat(self.periods, sections)}
 
     def __repr__(self) -> str:
         count, sections, _ = self.points.shape

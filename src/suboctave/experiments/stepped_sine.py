@@ -14,10 +14,9 @@ What a stepped-sine test brings: amplitudes and phases over frequency, as tables
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, Unpack
+from typing import Annotated, Any, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,9 +40,6 @@ from suboctave.model.system import System
 from suboctave.options import with_options
 from suboctave.progress import Report, reporting
 from suboctave.timedomain.flow import Flow, check_extent
-
-if TYPE_CHECKING:
-    import pandas
 
 _DIRECTIONS = ("up", "down", "both")
 _SAMPLES = 128
@@ -278,6 +274,8 @@ class SteppedSine(TimeResult):
         (S,): at which frequency the tap was given, nan without one.
     complete
         False where an interruption (Ctrl-C) left steps out.
+
+    The table has one row per measured step: direction, omega, amplitude and phase of the fundamental, others, period.
     """
 
     contents = "stepped sine"
@@ -322,23 +320,13 @@ class SteppedSine(TimeResult):
         """|X_1| of the observed degree of freedom, (V,)."""
         return np.abs(self.harmonic(1, None, direction))
 
-    def to_dataframe(self) -> pandas.DataFrame:
-        """One row per measured step: direction, omega, amplitude and phase of the fundamental, others, period."""
-        import pandas as pd
-
-        rows = []
-        for s, direction in enumerate(self.directions):
-            for v in np.flatnonzero(self.period[s] >= 0):
-                x = complex(self.response[s, v, self.observed])
-                row = {"direction": direction, "omega": self.omega[v], "amplitude": abs(x),
-                       "phase_deg": math.degrees(math.atan2(x.imag, x.real))}  # fmt: skip
-                for k, c in zip(self.multiples, self.components[s, v, :, self.observed], strict=True):
-                    if k != 1.0:
-                        row[f"harmonic_{k:g}"] = abs(c)
-                rows.append(row | {"largest": self.largest[s, v, self.observed], "period": self.period[s, v]})
-        names = ["direction", "omega", "amplitude", "phase_deg"]
-        names += [f"harmonic_{k:g}" for k in self.multiples if k != 1.0]
-        return pd.DataFrame(rows, columns=[*names, "largest", "period"])
+    def _columns(self) -> Mapping[str, Any]:
+        s, v = np.nonzero(self.period >= 0)
+        x, others = self.response[s, v, self.observed], self.components[s, v, :, self.observed]
+        columns = {"direction": np.array(self.directions)[s], "omega": self.omega[v]}
+        columns |= {"amplitude": np.abs(x), "phase_deg": np.degrees(np.angle(x))}
+        columns |= {f"harmonic_{k:g}": np.abs(others[:, i]) for i, k in enumerate(self.multiples) if k != 1.0}
+        return columns | {"largest": self.largest[s, v, self.observed], "period": self.period[s, v]}
 
     def plot(self, path: Any = None, curves: Any = None, measured: Any = None, **options: Any) -> Any:
         """Draw the measured fundamentals, over branches and beside data of a rig if any are given; saved to a path.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, Unpack
+from typing import Annotated, Any, Unpack
 
 import numpy as np
 
@@ -15,10 +15,6 @@ from suboctave.model.system import System
 from suboctave.options import RunOptions, with_options
 from suboctave.progress import reporting
 from suboctave.timedomain.flow import Flow
-
-if TYPE_CHECKING:
-    import pandas
-    import xarray
 
 
 @dataclass(eq=False)
@@ -42,8 +38,8 @@ class Trajectory(TimeResult):
     seconds
         How long it took.
 
-    `plot` draws displacement over time in load periods, stroboscopic instants marked; options are those of
-    `pictures.plot_trajectory`: `dof`, `quantity`, `title`, `size`.
+    The table has one row per sample. `plot` draws displacement over time in load periods, stroboscopic instants marked;
+    options are those of `pictures.plot_trajectory`: `dof`, `quantity`, `title`, `size`.
     """
 
     contents = "trajectory"
@@ -74,18 +70,12 @@ class Trajectory(TimeResult):
         every = slice(None, None, self.steps_per_period)
         return np.hstack([self.displacement[every], self.velocity[every]])
 
-    def to_xarray(self) -> xarray.Dataset:
-        """Displacement and velocity on (time, dof), and what produced them."""
-        return self._dataset(attributes={"observed": self.system.observed_dof})
+    def _derived(self) -> Mapping[str, Any]:
+        return {"observed": self.system.observed_dof}
 
-    def to_dataframe(self) -> pandas.DataFrame:
-        """One row per sample: time, displacements, velocities."""
-        import pandas as pd
-
-        columns = {"time": self.time}
-        for kind, values in (("x", self.displacement), ("v", self.velocity)):
-            columns |= {f"{kind}_{i}": values[:, i] for i in range(self.system.n)}
-        return pd.DataFrame(columns)
+    def _columns(self) -> Mapping[str, Any]:
+        parts = (("x", self.displacement), ("v", self.velocity))
+        return {"time": self.time} | {f"{kind}_{i}": x for kind, part in parts for i, x in enumerate(part.T)}
 
     def __repr__(self) -> str:
         periods = (len(self.time) - 1) / self.steps_per_period
