@@ -107,7 +107,6 @@ class Catalogue:
 
     def __init__(self, system: System, omega: float, values: Mapping[str, float], how: Integration) -> None:
         self.system, self.omega, self.values, self.how = system, omega, values, how
-        self.tolerance = how.tolerance or 0.0
         #: all that a motion must agree with
         self.wanted = {**system.parameters, **values, "omega": omega}
         self.known: list[BasinAttractor] = []
@@ -132,33 +131,27 @@ class Catalogue:
             return None
         if not solution.stable:
             return None
-        points, sizes = self._cycle(solution)
+        flow = Flow(self.system, "accurate", tolerance=1e-12)
+        motions = flow.over(solution.state, self.omega, solution.periods, self.values, workers=1).whole()
+        points = np.vstack([solution.state[None], motions.states[0][:-1]])
+        sizes = self._extents(points)
         for shorter in range(1, period):
             if period % shorter == 0 and same_cycle(np.roll(points, shorter, axis=0)[:1], points[:1], sizes, _SAME):
                 return self.add(solution.state, shorter, name, given)
         known = self.find(points)
         if known is None:
-            self.enter(self._name(name, period), points, solution.amplitude, solution.multipliers, given, sizes)
+            self.enter(self._name(name, period), points, solution.amplitude, solution.multipliers, given)
             return len(self.known) - 1
         if given and not self.known[known].given and name:
             self.known[known] = replace(self.known[known], name=self._name(name, period), given=True)
         return known
 
     def enter(
-        self,
-        name: str,
-        points: Array,
-        amplitude: float,
-        multipliers: NDArray[np.complex128],
-        given: bool,
-        sizes: Array | None = None,
+        self, name: str, points: Array, amplitude: float, multipliers: NDArray[np.complex128], given: bool
     ) -> None:
         """Enter a motion that is known to be one, and look for its neighbourhoods."""
-        if sizes is None:
-            sizes = self._extents(points)
-        traps = traps_about(
-            self.system, points, self.omega, self.values, sizes, max(self.tolerance, 1e-8), self.how.workers
-        )
+        sizes, tolerance = self._extents(points), max(self.how.tolerance or 0.0, 1e-8)
+        traps = traps_about(self.system, points, self.omega, self.values, sizes, tolerance, self.how.workers)
         self.known.append(BasinAttractor(name, len(points), points, amplitude, multipliers, given, traps))
         self._sizes.append(sizes)
 
@@ -169,12 +162,6 @@ class Catalogue:
             for trap in one.traps:
                 out[(out < 0) & trap.holds(states)] = i
         return out
-
-    def _cycle(self, solution: PeriodicSolution) -> tuple[Array, Array]:
-        flow = Flow(self.system, "accurate", tolerance=1e-12)
-        motions = flow.over(solution.state, self.omega, solution.periods, self.values, workers=1).whole()
-        points = np.vstack([solution.state[None], motions.states[0][:-1]])
-        return points, self._extents(points)
 
     def _extents(self, points: Array) -> Array:
         flow = Flow(self.system, "accurate", tolerance=1e-10)
@@ -259,12 +246,8 @@ def _motion(catalogue: Catalogue, one: Any) -> tuple[Array, int]:
 
 def _differences(catalogue: Catalogue, has: Mapping[str, float]) -> list[str]:
     """The names under which a motion has other values."""
-    wanted = catalogue.wanted
-    return [
-        name
-        for name in wanted
-        if abs(has.get(name, wanted[name]) - wanted[name]) > _NEAR * max(abs(wanted[name]), 1e-300)
-    ]
+    pairs = ((name, value, has.get(name, value)) for name, value in catalogue.wanted.items())
+    return [name for name, value, own in pairs if abs(own - value) > _NEAR * max(abs(value), 1e-300)]
 
 
 def _crossings(catalogue: Catalogue, branch: Curve) -> list[tuple[Array, int]]:

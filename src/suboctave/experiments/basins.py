@@ -19,17 +19,17 @@ from numpy.typing import NDArray
 
 from suboctave.errors import InputError, path_of, suggest
 from suboctave.experiments.basin_attractors import BasinAttractor, Catalogue, Given, enter_attractors, read_attractors
-from suboctave.experiments.common import BasinOptions, On, TimeResult, checked_integration
+from suboctave.experiments.common import BasinOptions, On, TimeResult, checked_integration, coordinates
 from suboctave.experiments.poincare import attractor_of
 from suboctave.interruption import Interruption
 from suboctave.model.elements.base import Array
 from suboctave.model.inputs import check_count, check_omega, check_range, start_state, timed
 from suboctave.model.system import System, describe
 from suboctave.options import with_options
-from suboctave.progress import reporting
+from suboctave.progress import Report, reporting
 from suboctave.store.journal import Journal, Record
 from suboctave.store.plain import Recorded, from_json, padded, to_json
-from suboctave.timedomain.flow import Flow, Motions, Report, check_extent
+from suboctave.timedomain.flow import Flow, Motions, check_extent
 from suboctave.timedomain.trapping import Trap
 
 APERIODIC, GONE, OPEN = -1, -2, -3
@@ -252,38 +252,14 @@ def basins(
             interruption = Interruption.of(cause)
         finally:
             run.close()
-    names = coordinates(system)
-    return _result(run, ends, (names[columns[0]], names[columns[1]]), state, interruption)
-
-
-def _result(
-    run: BasinRun, ends: list[Array], plane: tuple[str, str], rest: Array, interruption: Interruption | None
-) -> Basins:
-    catalogue, shape = run.catalogue, (len(ends[1]), len(ends[0]))
-    system = catalogue.system
+    names, shape = coordinates(system), (counts[1], counts[0])
     result = Basins(
-        x=ends[0],
-        y=ends[1],
-        labels=run.labels.reshape(shape),
-        settling=run.settling.reshape(shape),
-        attractors=catalogue.known,
-        plane=plane,
-        rest=rest,
-        omega=catalogue.omega,
-        parameters={**system.parameters, **catalogue.values},
-        followed=run.followed,
-        contradicted=run.contradicted,
-        complete=interruption is None,
-        observed=catalogue.how.observe,
-        system=system,
-    )
+        ends[0], ends[1], run.labels.reshape(shape), run.settling.reshape(shape), catalogue.known,
+        (names[columns[0]], names[columns[1]]), state, catalogue.omega, {**system.parameters, **values},
+        run.followed, run.contradicted, interruption is None, how.observe, system,
+    )  # fmt: skip
     result.interruption = interruption
     return result
-
-
-def coordinates(system: System) -> list[str]:
-    """Names of the entries of a state: `x_0 ... v_0 ...`."""
-    return [f"{kind}_{i}" for kind in "xv" for i in range(system.n)]
 
 
 def check_plane(system: System, plane: Any, observe: int) -> tuple[int, int]:

@@ -119,6 +119,11 @@ def starting_states(system: System, states: Any) -> Array:
     return array
 
 
+def coordinates(system: System) -> list[str]:
+    """Names of the entries of a state: `x_0 ... v_0 ...`."""
+    return [f"{kind}_{i}" for kind in "xv" for i in range(system.n)]
+
+
 # ------------------------------------------------------------------------------------------------------------- grids
 def checked_range(name: str, given: Any, count: int, positive: bool) -> Array:
     """Increasing values: `count` of a range `(from, to)`, or all of an array."""

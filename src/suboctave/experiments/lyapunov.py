@@ -34,9 +34,9 @@ from suboctave.model.elements.base import Array
 from suboctave.model.inputs import check_count, check_omega, start_state, timed
 from suboctave.model.system import System
 from suboctave.options import with_options
-from suboctave.progress import reporting
+from suboctave.progress import Report, reporting
 from suboctave.store.plain import Recorded
-from suboctave.timedomain.flow import METHODS, Flow, Motions, Report, check_extent
+from suboctave.timedomain.flow import METHODS, Flow, Motions, check_extent
 
 #: how far from the first trajectory the others begin, in sizes of the motion
 _APART = 1e-3

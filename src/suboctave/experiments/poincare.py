@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from suboctave.errors import InputError
-from suboctave.experiments.common import On, SectionOptions, StatesOn, TimeResult, checked_integration
+from suboctave.experiments.common import On, SectionOptions, StatesOn, TimeResult, checked_integration, coordinates
 from suboctave.model.elements.base import Array
 from suboctave.model.inputs import check_count, start_state, timed
 from suboctave.model.system import System
@@ -118,8 +118,8 @@ class PoincareSections(TimeResult):
         return {"varied": {name: stored["parameters"][:, names.index(name)].copy() for name in stored.record["varied"]}}
 
     def _columns(self) -> Mapping[str, Any]:
-        count, sections, size = self.points.shape
-        names = [f"{kind}_{i}" for kind in "xv" for i in range(size // 2)]
+        count, sections, _ = self.points.shape
+        names = coordinates(self.system)
         taken = ("trajectory", "omega", "section", *names, "period")
         varied = {"omega": self.omega} | {parameter_column(n, taken): v for n, v in self.varied.items()}
         columns: dict[str, Any] = {"trajectory": np.repeat(np.arange(count), sections)}

@@ -32,7 +32,7 @@ from suboctave.experiments.common import (
     checked_integration,
     checked_range,
 )
-from suboctave.experiments.poincare import Attractor, attractor_of
+from suboctave.experiments.poincare import attractor_of
 from suboctave.interruption import Interruption
 from suboctave.model.elements.base import Array
 from suboctave.model.inputs import check_count, observed_dof, start_state, timed
@@ -180,16 +180,15 @@ class _Test:
             for s, v in enumerate(columns):
                 x, peaks = motions.states[s], motions.peaks[s]
                 largest = peaks.reshape(self.measure, -1, n).max(axis=1)
-                settled = self._attractor(x[_SAMPLES - 1 :: _SAMPLES], largest, float(w[s]))
+                settled = attractor_of(
+                    self.system, x[_SAMPLES - 1 :: _SAMPLES], largest, float(w[s]), self.system.parameters,
+                    self.how.period_tolerance, self.how.observe,
+                )  # fmt: skip
                 out.period[s, v], out.largest[s, v], out.ends[s, v] = settled.period, largest.max(axis=0), states[s]
                 samples = x[:, :n] + (self.random.normal(0.0, self.noise, (len(x), n)) if self.noise else 0.0)
                 out.components[s, v], out.response[s, v] = self._measured(samples, float(w[s]))
             if report is not None:
                 report((step + 1) / count, f"omega = {w[0]:.6g}")
-
-    def _attractor(self, points: Array, largest: Array, omega: float) -> Attractor:
-        how, parameters = self.how, self.system.parameters
-        return attractor_of(self.system, points, largest, omega, parameters, how.period_tolerance, how.observe)
 
     def _measured(self, x: Array, omega: float) -> tuple[ComplexArray, ComplexArray]:
         """Components (K, n), and the fundamental (n,) by cross- over auto-spectrum."""

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Unpack
 
 import numpy as np
 
-from suboctave.experiments.common import FEW, On, TimeResult, steps_of
+from suboctave.experiments.common import FEW, On, TimeResult, coordinates, steps_of
 from suboctave.model.elements.base import Array
 from suboctave.model.inputs import check_count, check_omega, start_state, timed
 from suboctave.model.system import System
@@ -74,8 +74,8 @@ class Trajectory(TimeResult):
         return {"observed": self.system.observed_dof}
 
     def _columns(self) -> Mapping[str, Any]:
-        parts = (("x", self.displacement), ("v", self.velocity))
-        return {"time": self.time} | {f"{kind}_{i}": x for kind, part in parts for i, x in enumerate(part.T)}
+        states = np.hstack([self.displacement, self.velocity])
+        return {"time": self.time, **dict(zip(coordinates(self.system), states.T, strict=True))}
 
     def __repr__(self) -> str:
         periods = (len(self.time) - 1) / self.steps_per_period

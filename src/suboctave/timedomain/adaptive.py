@@ -18,13 +18,11 @@ from typing import Any
 import numpy as np
 
 from suboctave.model.elements.base import Array
-from suboctave.model.elements.batch_form import Tangent
 from suboctave.timedomain.adaptive_control import SCALARS, VECTORS
 from suboctave.timedomain.batch import ROOM, Group, Method
 from suboctave.timedomain.generated import Index, Rows, module_of
-from suboctave.timedomain.law_code import LawCode
-from suboctave.timedomain.layout import Layout, Numbers, PlacedLaw
-from suboctave.timedomain.python_callbacks import callback_shapes
+from suboctave.timedomain.law_code import LawCode, callback_shapes
+from suboctave.timedomain.layout import Layout, Numbers
 
 __all__ = ["AdaptiveMethod"]
 
@@ -258,11 +256,8 @@ class _AdaptiveCode(LawCode):
         """The rate of the trial state, and the slopes of the forces."""
         n, z, code = self.n, self.z, self.code
 
-        def frozen(placed: PlacedLaw) -> Tangent:
-            return placed.form.frozen(self.names(placed), slopes)
-
         self.read(self._channels())
-        forces, derivatives = self.forces(frozen)
+        forces, derivatives = self.forces(lambda placed: placed.form.frozen(self.names(placed), slopes))
         code.each(*(f"{z('F', o)} = {force}" for o, force in enumerate(forces)))
         if slopes:
             self.slopes = list(derivatives)

@@ -10,8 +10,9 @@ is there). Every gap, and every point where a smooth law is sharp, is a switch: 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,32 +50,26 @@ class Switch:
     stiffness: float | None
 
 
-@dataclass(frozen=True)
-class _Loads:
+class _Loads(NamedTuple):
     """The loads as rows: `direction[i] amplitude[i] cos(harmonic[i] omega t + phase[i])`, with d/d omega."""
 
     direction: Array  # (m, n)
     harmonic: Array  # (m,)
     amplitude: Array
-    phase: Array
     amplitude_slope: Array
+    phase: Array
     phase_slope: Array
 
 
 def _loads(system: System, at: Mapping[str, float]) -> _Loads:
+    def read(c: Coefficient) -> tuple[float, float]:
+        """Value, and its derivative with respect to omega."""
+        return c.value(at), c.derivative("omega").value(at) if "omega" in c.names else 0.0
+
     components = system.load_components()
-
-    def read(coefficients: Iterable[Coefficient]) -> tuple[Array, Array]:
-        """Values, and their derivatives with respect to omega."""
-        pairs = [(c.value(at), c.derivative("omega").value(at) if "omega" in c.names else 0.0) for c in coefficients]
-        values, slopes = np.array(pairs).reshape(-1, 2).T
-        return values, slopes
-
-    amplitude, amplitude_slope = read(c.amplitude for c in components)
-    phase, phase_slope = read(c.phase for c in components)
+    numbers = [(c.harmonic, *read(c.amplitude), *read(c.phase)) for c in components]
     direction = np.array([c.direction for c in components], dtype=float).reshape(-1, system.n)
-    harmonic = np.array([c.harmonic for c in components], dtype=float)
-    return _Loads(direction, harmonic, amplitude, phase, amplitude_slope, phase_slope)
+    return _Loads(direction, *np.array(numbers, dtype=float).reshape(-1, 5).T.copy())
 
 
 class Field:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, replace
 from time import perf_counter
@@ -25,16 +25,16 @@ from suboctave.interruption import Interruption, check_time, pass_on
 from suboctave.model.elements.base import Array
 from suboctave.model.inputs import check_count
 from suboctave.model.system import System
+from suboctave.progress import Report
 from suboctave.timedomain.adaptive import AdaptiveMethod
 from suboctave.timedomain.batch import Batch, Group, Method
+from suboctave.timedomain.law_code import PythonCallbacks
 from suboctave.timedomain.layout import Layout
 from suboctave.timedomain.newmark import NewmarkMethod
-from suboctave.timedomain.python_callbacks import PythonCallbacks
 
-__all__ = ["METHODS", "Flow", "Motions", "Report", "check_extent"]
+__all__ = ["METHODS", "Flow", "Motions", "check_extent"]
 
 METHODS = ("accurate", "newmark")
-Report = Callable[[float, str], None]
 #: seconds after which a run is interrupted or reports
 _INTERVAL = 0.1
 #: numbers that one answer may hold, and periods of the load that all trajectories together may take (weeks on one
@@ -167,6 +167,7 @@ class Flow:
         measure: bool = False,
         workers: int | None = None,
         report: Report | None = None,
+        first: NDArray[np.int_] | None = None,
     ) -> Motions:
         """Follow trajectories from phase 0 of the load over whole periods.
 
@@ -186,6 +187,9 @@ class Flow:
             Threads; default: as many as there are processors.
         report
             Called with the share done and a text, from the calling thread.
+        first
+            For methods that cut a period in pieces, such as multiple shooting: the sample of the period at which each
+            begins, (B,); it is followed to the next one only. With the accurate method.
 
         Raises
         ------
@@ -193,7 +197,19 @@ class Flow:
             Before any work, for shapes and values that make no sense.
         """
         periods = check_count("periods", periods)
-        return self._run(states, omega, parameters, periods, skip, measure).go(workers, report)
+        if first is not None and self.method != "accurate":
+            raise InputError('pieces of a period are followed with method="accurate"')
+        x, w, varied = self._broadcast(states, omega, parameters or {})
+        count, total = len(x), 1 if first is not None else periods * self.samples
+        skip = min(max(int(skip), 0), total)
+        check_extent(count, periods, count * (total - skip) * 2 * self.layout.n)
+        which = np.arange(count) if len(w) > 1 else np.zeros(count, dtype=int)
+        numbers = self.layout.numbers(w, varied)
+        rows = {name: value.reshape(len(w), -1) for name, value in self.integrator.numbers(numbers).items()}
+        sizes, callbacks = self.layout.sizes(numbers, x, which), PythonCallbacks(self.layout.called_back)
+        at = None if first is None else np.broadcast_to(np.asarray(first) % self.samples, (count,)).astype(float)
+        batch = Batch(rows, which, x, sizes, total, skip, measure, at, callbacks.address)
+        return _Run(self.integrator, batch, callbacks).go(workers, report)
 
     def onward(
         self,
@@ -203,37 +219,8 @@ class Flow:
         parameters: Mapping[str, ArrayLike] | None = None,
         workers: int | None = None,
     ) -> Motions:
-        """Follow each trajectory from an instant of its own to the next: from sample `first` (B,) of the period.
-
-        For methods that cut a period in pieces, such as multiple shooting; with the accurate method only. The rest is
-        as in `over`.
-        """
-        if self.method != "accurate":
-            raise InputError('pieces of a period are followed with method="accurate"')
-        return self._run(states, omega, parameters, 1, 0, False, first).go(workers, None)
-
-    def _run(
-        self,
-        states: ArrayLike,
-        omega: ArrayLike,
-        parameters: Mapping[str, ArrayLike] | None,
-        periods: int,
-        skip: int,
-        measure: bool,
-        first: NDArray[np.int_] | None = None,
-    ) -> _Run:
-        """A run over so many periods, or from samples `first` to the next ones."""
-        x, w, varied = self._broadcast(states, omega, parameters or {})
-        count, total = len(x), 1 if first is not None else periods * self.samples
-        skip = min(max(int(skip), 0), total)
-        check_extent(count, periods, count * (total - skip) * 2 * self.layout.n)
-        which = np.arange(count) if len(w) > 1 else np.zeros(count, dtype=int)
-        numbers = self.layout.numbers(w, varied)
-        rows = {name: value.reshape(numbers.count, -1) for name, value in self.integrator.numbers(numbers).items()}
-        sizes, callbacks = self.layout.sizes(numbers, x, which), PythonCallbacks(self.layout.called_back)
-        at = None if first is None else np.broadcast_to(np.asarray(first) % self.samples, (count,)).astype(float)
-        batch = Batch(rows, which, x, sizes, total, skip, measure, at, callbacks.address)
-        return _Run(self.integrator, batch, callbacks)
+        """Follow each trajectory from sample `first` (B,) of the period to the next one; the rest is as in `over`."""
+        return self.over(states, omega, 1, parameters, workers=workers, first=first)
 
     def _broadcast(
         self, states: ArrayLike, omega: ArrayLike, parameters: Mapping[str, ArrayLike]
@@ -313,7 +300,9 @@ class _Run:
         return replace(motions, interruption=interruption)
 
     def _together(self, many: int, report: Report | None) -> None:
-        self._compile()
+        # compiled once, before the threads
+        nobody = np.zeros(self.method.rows.lanes, dtype=int)
+        self.method.advance(Group(self.method, replace(self.batch, skip=self.batch.total), nobody, 0), 0)
         with ThreadPoolExecutor(many) as pool:
             pending: set[Future[None]] = {pool.submit(self._follow, g, None) for g in range(len(self.groups))}
             try:
@@ -331,14 +320,8 @@ class _Run:
     def _report(self, report: Report | None) -> None:
         check_time()
         if report is not None:
-            share = sum(self.done) / len(self.done)
-            count = len(self.batch.states)
+            share, count = sum(self.done) / len(self.done), len(self.batch.states)
             report(share, f"{share * count:.0f} of {count} trajectories")
-
-    def _compile(self) -> None:
-        """Once, before the threads."""
-        nobody = np.zeros(self.method.rows.lanes, dtype=int)
-        self.method.advance(Group(self.method, replace(self.batch, skip=self.batch.total), nobody, 0), 0)
 
     def _follow(self, g: int, report: Report | None) -> None:
         members, method, batch = self.groups[g], self.method, self.batch
@@ -346,10 +329,11 @@ class _Run:
         filled = np.array([*members, *[members[0]] * (method.rows.lanes - len(members))])
         group = Group(method, batch, filled, len(members))
         effort, arrived = method.effort, False
-        while not arrived and not self._stopped():
+        while not (arrived or self.stop.is_set() or self.callbacks.failure is not None):
             started = perf_counter()
             arrived = method.advance(group, effort)
-            effort = _next_chunk(effort, perf_counter() - started)
+            # what will take about `_INTERVAL`
+            effort = max(1, int(effort * min(4.0, _INTERVAL / max(perf_counter() - started, 1e-6))))
             self.done[g] = 1.0 - min(1.0, method.left(group) / (batch.total * len(members)))
             self._report(report)
         if not arrived or self.stop.is_set():
@@ -359,19 +343,9 @@ class _Run:
             getattr(self.motions, name)[members.start : members.stop] = values[: len(members)]
         self.motions.finished[members.start : members.stop] = True
 
-    def _stopped(self) -> bool:
-        return self.stop.is_set() or self.callbacks.failure is not None
-
-
-def _next_chunk(chunk: int, seconds: float) -> int:
-    """What will take about `_INTERVAL` seconds, if `chunk` took `seconds`."""
-    return max(1, int(chunk * min(4.0, _INTERVAL / max(seconds, 1e-6))))
-
 
 def _processors() -> int:
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _floats(name: str, given: ArrayLike) -> Array:

@@ -24,7 +24,7 @@ from suboctave.timedomain.field import Array, Field
 if TYPE_CHECKING:
     from scipy.integrate import DOP853, DenseOutput
 
-__all__ = ["Crossing", "Passage", "Step", "advance", "reach"]
+__all__ = ["Contact", "Passage", "Step", "advance", "reach"]
 
 # Points on the interpolant of a step at which distances are looked at, when a switch is near.
 _GRID = np.linspace(0.0, 1.0, 9)
@@ -35,11 +35,12 @@ _LANDING_ITERATIONS = 4
 
 
 @dataclass(frozen=True)
-class Crossing:
-    """Switch number `switch` changes sign at `tau`; `closing` if its piece acts afterwards."""
+class Contact:
+    """An instant at which an element meets (`closing`) or leaves its gap."""
 
-    tau: float
-    switch: int
+    time: float
+    element: int
+    gap: float
     closing: bool
 
 
@@ -56,11 +57,11 @@ class Step:
 
 @dataclass
 class Passage:
-    """What an integration brings: the stacked state at the end, the crossings, the extent of the motion."""
+    """What an integration brings: the stacked state at the end, the contacts, the extent of the motion."""
 
     y: Array
     extent: Array  # (2n,) largest modulus of each scaled component over the step ends
-    crossings: list[Crossing] = field(default_factory=list)
+    contacts: list[Contact] = field(default_factory=list)
     steps: list[Step] = field(default_factory=list)
     tau: list[float] = field(default_factory=list)
     states: list[Array] = field(default_factory=list)
@@ -111,29 +112,26 @@ class _Watch:
         self._last = np.full(len(self.active), -np.inf)
         self._repeats = np.zeros(len(self.active), dtype=int)
 
-    def _margin(self, z: Array) -> Array:
-        return self._signed(self.model.distances(z))
-
-    def _margin_rate(self, z: Array) -> Array:
-        return self._signed(self.model.approach(z))
-
-    def _signed(self, values: Array) -> Array:
+    def _margins(self, z: Array) -> tuple[Array, Array]:
+        """Distances from the changes, positive on this side of them, and their rates."""
         sign = np.where(self.active, 1.0, -1.0)
-        return (sign if values.ndim == 1 else sign[:, None]) * values
+        sign = sign if z.ndim == 1 else sign[:, None]
+        return sign * self.model.distances(z), sign * self.model.approach(z)
 
-    def change(self, tau: float, switch: int) -> Crossing:
+    def change(self, tau: float, switch: int) -> Contact:
         """Note that `switch` changes at `tau`."""
         self._repeats[switch] = self._repeats[switch] + 1 if abs(tau - self._last[switch]) <= 8 * _EPS * abs(tau) else 0
         self._last[switch] = tau
         self.active[switch] = not self.active[switch]
-        return Crossing(tau, switch, bool(self.active[switch]))
+        place = self.model.switches[switch]
+        return Contact(tau / self.model.omega, place.element, place.gap, bool(self.active[switch]))
 
     def first_change(self, solver: DOP853) -> tuple[float, int] | None:
         """The earliest instant in the solver's last step at which a switch changes, and which one; else None."""
         m, h = 2 * self.model.n, solver.t - solver.t_old
         old, new = _at_start(solver)[:m], solver.y[:m]
-        start, end = self._margin(old), self._margin(new)
-        reach = 2.0 * h * np.maximum(np.abs(self._margin_rate(old)), np.abs(self._margin_rate(new)))
+        (start, leaving), (end, arriving) = self._margins(old), self._margins(new)
+        reach = 2.0 * h * np.maximum(np.abs(leaving), np.abs(arriving))
         near = np.flatnonzero((end < 0.0) | (np.minimum(np.abs(start), np.abs(end)) <= reach))
         if near.size == 0:
             return None
@@ -141,7 +139,7 @@ class _Watch:
         times = solver.t_old + h * _GRID
         z = interpolant(times)[:m]
         z[:, 0], z[:, -1] = old, new
-        margins, rates = self._margin(z), self._margin_rate(z)
+        margins, rates = self._margins(z)
         best: tuple[float, int] | None = None
         for i in near:
             if self._repeats[i] >= _CHATTER and self._last[i] == solver.t_old:
@@ -155,10 +153,10 @@ class _Watch:
         m = 2 * self.model.n
 
         def distance(t: float) -> float:
-            return float(self._margin(interpolant(t)[:m])[i])
+            return float(self._margins(interpolant(t)[:m])[0][i])
 
         def speed(t: float) -> float:
-            return float(self._margin_rate(interpolant(t)[:m])[i])
+            return float(self._margins(interpolant(t)[:m])[1][i])
 
         for k in range(len(times) - 1):
             a, b = float(times[k]), float(times[k + 1])
@@ -187,8 +185,7 @@ class _Watch:
             if tau - begin <= 4 * _EPS * abs(begin):
                 return best[1:] if best is not None else (begin, y_begin)
             y = reach(self.model, rhs, begin, y_begin, tau, rtol, atol)
-            z = y[:m]
-            distance, approach = float(self._margin(z)[switch]), float(self._margin_rate(z)[switch])
+            distance, approach = (float(values[switch]) for values in self._margins(y[:m]))
             if best is not None and abs(distance) >= best[0]:
                 break
             best = abs(distance), tau, y
@@ -233,7 +230,7 @@ def advance(
             at, y_at = watch.land(rhs, solver, change[0], change[1], rtol, atol)
             if at > solver.t_old:
                 _record(out, solver, at, y_at, watch, m, dense)
-            out.crossings.append(watch.change(at, change[1]))
+            out.contacts.append(watch.change(at, change[1]))
             tau, y = at, y_at
             break
         else:

@@ -52,11 +52,6 @@ class Numbers:
     loads: Array
     laws: Array
 
-    @property
-    def count(self) -> int:
-        """How many sets of parameters there are."""
-        return len(self.omega)
-
 
 class Layout:
     """Channels (m, n), output directions (k, n), laws, and the waves (harmonic, whether sine) that loads consist of."""
@@ -80,7 +75,8 @@ class Layout:
         self.outputs = np.array([np.frombuffer(key) for key in outputs]).reshape(-1, n)
         components = system.load_components()
         waves = {(c.harmonic, False) for c in components}
-        waves |= {(c.harmonic, True) for c in components if c.harmonic and not _is_zero(c.phase)}
+        shifted = (c for c in components if not (c.phase.constant and c.phase.value({}) == 0.0))
+        waves |= {(c.harmonic, True) for c in shifted if c.harmonic}
         self.waves = tuple(sorted(waves))
 
     @property
@@ -113,7 +109,8 @@ class Layout:
             used = frozenset().union(*(c.names for c in placed.element.coefficients))
             end = placed.begin + placed.form.count
             laws[:, placed.begin : end] = each(bool(used & names), lambda at, _, one=placed: self._law(one, at))
-        self._check(mass, damping, stiffness, laws)
+        if not all(np.isfinite(array[array != np.inf]).all() for array in (mass, damping, stiffness, laws)):
+            raise InputError("the parameters make a matrix or a coefficient infinite or undefined")
         return Numbers(omega, mass, damping, stiffness, self._loads(sets, omega), laws)
 
     def _law(self, placed: PlacedLaw, at: Mapping[str, float]) -> list[float]:
@@ -135,10 +132,6 @@ class Layout:
                     column = self.waves.index((component.harmonic, wave))
                     out[:, :, column] += (amplitude * factor)[:, None] * component.direction
         return out
-
-    def _check(self, *arrays: Array) -> None:
-        if not all(np.isfinite(array[array != np.inf]).all() for array in arrays):
-            raise InputError("the parameters make a matrix or a coefficient infinite or undefined")
 
     def wave_table(self, points: int) -> Array:
         """The waves (points, W) at the instants `2 pi i / points` of the phase."""
@@ -162,10 +155,6 @@ class Layout:
 
 def _entered(table: dict[bytes, int], row: Array) -> int:
     return table.setdefault(np.ascontiguousarray(row + 0.0, dtype=float).tobytes(), len(table))
-
-
-def _is_zero(c: Coefficient) -> bool:
-    return c.constant and c.value({}) == 0.0
 
 
 def _values(c: Coefficient, sets: Sequence[Mapping[str, float]], omega: Array) -> Array:

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -127,19 +128,15 @@ def _neimark_sacker(start: CurvePoint) -> Callable[[CurvePoint], float]:
     upper = multipliers[multipliers.imag > 1e-6 * np.abs(multipliers)]
     if upper.size == 0:
         return lambda point: 1.0
-    current = [upper[np.argmin(np.abs(np.abs(upper) - 1.0))]]
+    current = upper[np.argmin(np.abs(np.abs(upper) - 1.0))]
 
     def value(point: CurvePoint) -> float:
-        all_of_them = np.linalg.eigvals(point.transition)
-        nearest = all_of_them[np.argmin(np.abs(all_of_them - current[0]))]
-        current[0] = nearest
-        return float(abs(nearest) ** 2 - 1.0)
+        nonlocal current
+        multipliers = np.linalg.eigvals(point.transition)
+        current = multipliers[np.argmin(np.abs(multipliers - current))]
+        return float(abs(current) ** 2 - 1.0)
 
     return value
-
-
-def _test_function(kind: str, start: CurvePoint) -> Callable[[CurvePoint], float]:
-    return _neimark_sacker(start) if kind == "NS" else lambda point: _determinant(kind, point)
 
 
 def locate_by_shooting(
@@ -203,14 +200,12 @@ def _drive(
         located = _secants(curve, kind, pair[1], pair[0], max_step, max_iterations)
         if located is not None:
             return located
-    place = (
-        f"no {kind} found along the curve of periodic motions from omega = {start.u[-1] * curve.model.reference:.9g}"
-    )
+    far, more = f"{max_iterations} steps", f", or allow longer steps (max_step = {max_step:g})"
     if reach is not None:
-        raise ConvergenceError(f"{place} within {reach:g} of the motion's size either way: start closer")
+        far, more = f"{reach:g} of the motion's size", ""
     raise ConvergenceError(
-        f"{place} within {max_iterations} steps either way: start closer, or allow longer steps "
-        f"(max_step = {max_step:g})"
+        f"no {kind} found along the curve of periodic motions from omega = {start.u[-1] * curve.model.reference:.9g} "
+        f"within {far} either way: start closer{more}"
     )
 
 
@@ -221,7 +216,7 @@ def _secants(
 
     `other`: a neighbour on the far side, where one is known. None when the test function does not get smaller.
     """
-    measure = _test_function(kind, start)
+    measure = _neimark_sacker(start) if kind == "NS" else partial(_determinant, kind)
     point, value = start, measure(start)
     best = (abs(value), point, value)
     step, bracket = _FIRST_STEP, other

@@ -180,13 +180,8 @@ class MultipleShooting:
         omega[:, :, 2 * m] += width * reference[:, None]
         omega[:, :, 2 * m + 1] -= width * reference[:, None]
         first = np.broadcast_to(np.arange(pieces)[None, :, None], omega.shape)
-        motions = self.flow.onward(
-            starts.reshape(-1, m),
-            omega.ravel(),
-            first.ravel(),
-            {name: np.repeat(values, pieces * each) for name, values in parameters.items()},
-            self.workers,
-        ).whole()
+        varied = {name: np.repeat(values, pieces * each) for name, values in parameters.items()}
+        motions = self.flow.onward(starts.reshape(-1, m), omega.ravel(), first.ravel(), varied, self.workers).whole()
         ends = motions.end.reshape(count, pieces, each, m) / sizes[:, None, None, :]
         slopes = (ends[:, :, 0:-1:2] - ends[:, :, 1:-1:2]) / (2.0 * width)
         transition = np.swapaxes(slopes[:, :, :m], 2, 3)

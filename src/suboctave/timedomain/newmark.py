@@ -23,12 +23,10 @@ from typing import Any
 import numpy as np
 
 from suboctave.model.elements.base import Array
-from suboctave.model.elements.batch_form import Tangent
 from suboctave.timedomain.batch import ROOM, Group, Method
 from suboctave.timedomain.generated import Index, Rows, module_of
-from suboctave.timedomain.law_code import LawCode
-from suboctave.timedomain.layout import Layout, Numbers, PlacedLaw
-from suboctave.timedomain.python_callbacks import callback_shapes
+from suboctave.timedomain.law_code import LawCode, callback_shapes
+from suboctave.timedomain.layout import Layout, Numbers
 
 __all__ = ["NewmarkMethod"]
 
@@ -188,11 +186,7 @@ class _NewmarkCode(LawCode):
             own = rate.format(rate=z("rate"), y=z("y", j), r=z("r", j))
             channels += [f"q{j} = {z('q', j)} + {z('y', j)}", f"r{j} = {own}"]
         self.read(channels)
-
-        def tangent(placed: PlacedLaw) -> Tangent:
-            return placed.form.tangent(self.names(placed))
-
-        return self.forces(tangent)
+        return self.forces(lambda placed: placed.form.tangent(self.names(placed)))
 
     def _solve(self) -> None:
         """R: one correction of y by Newton's method. The matrix is near the identity for short steps: no pivots."""
@@ -205,13 +199,8 @@ class _NewmarkCode(LawCode):
         )
 
         def row(j: Index) -> None:
-            def entry(i: Index) -> str:
-                return (
-                    f"{float(i == j)}" if isinstance(i, int) and isinstance(j, int) else f"1.0 if {i} == {j} else 0.0"
-                )
-
             product = [(k, "+", lambda i, o: f"{z('G', j, o)} * {z('J', o, i)}")]
-            code.sums(m, lambda i: z("D", j, i), entry, product)
+            code.sums(m, lambda i: z("D", j, i), lambda i: f"(1.0 if {i} == {j} else 0.0)", product)
 
         def eliminate(p: Index) -> None:
             def below(j: Index) -> None:

@@ -14,19 +14,9 @@ from numpy.typing import ArrayLike
 from suboctave.errors import InputError
 from suboctave.model import System
 from suboctave.timedomain.field import Array, Field, scaled_field
-from suboctave.timedomain.integrator import Passage, advance, reach
+from suboctave.timedomain.integrator import Contact, Passage, advance, reach
 
 __all__ = ["Contact", "Trajectory", "integrate", "largest_displacement", "state_transition"]
-
-
-@dataclass(frozen=True)
-class Contact:
-    """An instant at which an element meets (`closing`) or leaves its gap."""
-
-    time: float
-    element: int
-    gap: float
-    closing: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,11 +101,7 @@ def integrate(
     else:
         t = wanted
         x, v = _read(model, passage, wanted)
-    contacts = tuple(
-        Contact(c.tau / omega, model.switches[c.switch].element, model.switches[c.switch].gap, c.closing)
-        for c in passage.crossings
-    )
-    return Trajectory(t, x, v, contacts, float(omega), passage, model)
+    return Trajectory(t, x, v, tuple(passage.contacts), float(omega), passage, model)
 
 
 def state_transition(
