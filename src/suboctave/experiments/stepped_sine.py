@@ -321,10 +321,11 @@ class SteppedSine(TimeResult):
 
     def _columns(self) -> Mapping[str, Any]:
         s, v = np.nonzero(self.period >= 0)
-        x, others = self.response[s, v, self.observed], self.components[s, v, :, self.observed]
+        x, others = self.response[s, v, self.observed], self.components[s, v, :, self.observed].T
         columns = {"direction": np.array(self.directions)[s], "omega": self.omega[v]}
-        columns |= {"amplitude": np.abs(x), "phase_deg": np.degrees(np.angle(x))}
-        columns |= {f"harmonic_{k:g}": np.abs(others[:, i]) for i, k in enumerate(self.multiples) if k != 1.0}
+        columns |= {"amplitude": np.hypot(x.real, x.imag), "phase_deg": np.degrees(np.angle(x))}
+        parts = zip(self.multiples, others, strict=True)
+        columns |= {f"harmonic_{k:g}": np.hypot(c.real, c.imag) for k, c in parts if k != 1.0}
         return columns | {"largest": self.largest[s, v, self.observed], "period": self.period[s, v]}
 
     def plot(self, path: Any = None, curves: Any = None, measured: Any = None, **options: Any) -> Any:
