@@ -7,12 +7,10 @@ from suboctave.model import library as library
 from suboctave.model.elements.base import Element as Element
 from suboctave.model.elements.callable import Callable as Callable
 from suboctave.model.elements.coupled import CoupledElement as CoupledElement, Expression as Expression
-from suboctave.model.elements.dampers import QuadraticDamper as QuadraticDamper, TanhFriction as TanhFriction
 from suboctave.model.elements.derivative_check import (
     DerivativeReport as DerivativeReport,
     check_derivatives as check_derivatives,
 )
-from suboctave.model.elements.hertz import HertzContact as HertzContact
 from suboctave.model.elements.smoothness import (
     AdaptiveSampling as AdaptiveSampling,
     CornerSampling as CornerSampling,
@@ -24,6 +22,11 @@ from suboctave.model.elements.smoothness import (
 )
 from suboctave.model.elements.springs import CubicSpring as CubicSpring, PolynomialSpring as PolynomialSpring
 from suboctave.model.elements.stops import Clearance as Clearance, ElasticStop as ElasticStop, Freeplay as Freeplay
+from suboctave.model.elements.written import (
+    HertzContact as HertzContact,
+    QuadraticDamper as QuadraticDamper,
+    TanhFriction as TanhFriction,
+)
 from suboctave.model.expressions.coefficients import Coefficient as Coefficient, coefficient as coefficient
 from suboctave.model.loads import (
     BaseAcceleration as BaseAcceleration,

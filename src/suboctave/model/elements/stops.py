@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Mapping
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -63,18 +63,6 @@ def _arctan_steps(sides: tuple[int, ...], c: tuple[float, ...]) -> SharpSampling
         constant += side * k * (max(-side * b, 0.0) + rounded)
     steps = tuple(k * side for side in sides)
     return SharpSampling(tuple(gaps), (1.0 / s,) * len(gaps), constant, 0.5 * k * len(gaps), steps)
-
-
-@lru_cache(maxsize=64)
-def _law_of(
-    sides: tuple[int, ...], names: tuple[str, ...], regularised: bool, owner: str
-) -> tuple[Law, list[int], list[int]]:
-    """The law as a text; where its coefficients, in alphabetical order, stand among `names`, and conversely."""
-    from suboctave.model.expressions.law import law_of
-
-    text = " + ".join(_text(side, gap, regularised) for side, gap in zip(sides, names[1:], strict=False))
-    order = np.argsort(names)
-    return law_of(text, ("x",), False, owner), order.tolist(), np.argsort(order).tolist()
 
 
 # ---------------------------------------------------------------------------------------------------------- elements
@@ -131,19 +119,23 @@ class _Stops(DeclaredElement):
             return _arctan_steps(self.sides, tuple(c.tolist()))
         return PiecewiseLinear(tuple(Piece(0, gap, side) for gap, side in enumerate(self.sides, start=1)))
 
-    def _written(self) -> tuple[Law, list[int], list[int]]:
-        return _law_of(self.sides, self.coefficient_names, self.regularised, type(self).__name__)
+    @cached_property
+    def _law(self) -> Law:
+        """The law as a text."""
+        from suboctave.model.expressions.law import law_of
+
+        stops = zip(self.sides, self.coefficient_names[1:], strict=False)
+        text = " + ".join(_text(side, gap, self.regularised) for side, gap in stops)
+        return law_of(text, ("x",), False, type(self).__name__, self.coefficient_names)
 
     def coefficient_tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, None]:
         """See `Element.coefficient_tangent`; for the exact law the regular parts."""
-        law, order, here = self._written()
-        f_c, f_qc = law.coefficient_tangent(u[None], np.zeros_like(u), c[order])
-        return f_c[here], f_qc[here, 0], None
+        f_c, f_qc = self._law.coefficient_tangent(u[None], np.zeros_like(u), c)
+        return f_c, f_qc[:, 0], None
 
     def coefficient_curvature(self, u: Array, v: Array, c: Array) -> Array:
         """See `Element.coefficient_curvature`; for the exact law the regular part."""
-        law, order, here = self._written()
-        return law.coefficient_curvature(u[None], np.zeros_like(u), c[order])[np.ix_(here, here)]
+        return self._law.coefficient_curvature(u[None], np.zeros_like(u), c)
 
 
 class ElasticStop(_Stops):

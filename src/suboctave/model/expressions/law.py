@@ -43,9 +43,12 @@ _OPERATIONS = 5000
 
 
 @functools.lru_cache(maxsize=512)
-def law_of(text: str, states: tuple[str, ...], short: bool, where: str) -> Law:
-    """The law of a text in the displacements `states` and their rates (with a prime); `short`: v is that of x."""
-    return Law(text, states, short, where)
+def law_of(text: str, states: tuple[str, ...], short: bool, where: str, coefficients: tuple[str, ...] = ()) -> Law:
+    """The law of a text in the displacements `states` and their rates (with a prime); `short`: v is that of x.
+
+    `coefficients`: the order of its other names, by default that of the alphabet.
+    """
+    return Law(text, states, short, where, coefficients)
 
 
 class Law:
@@ -54,7 +57,7 @@ class Law:
     Attributes
     ----------
     coefficients
-        Names that are neither states nor time, sorted.
+        Names that are neither states nor time.
     corner_input
         Which of the displacements has the corners; they are known as such if it is the first.
     phase, rough
@@ -63,8 +66,10 @@ class Law:
         Whether a velocity occurs; the highest multiple of the load's frequency, 0 without time.
     """
 
-    def __init__(self, text: str, states: tuple[str, ...], short: bool, where: str) -> None:
-        self._source = text, states, short, where
+    def __init__(
+        self, text: str, states: tuple[str, ...], short: bool, where: str, coefficients: tuple[str, ...]
+    ) -> None:
+        self._source = text, states, short, where, coefficients
         expression = force_expression(text, where)
         if short:
             expression = expression.subs(symbol("v"), symbol("x" + PRIME))
@@ -76,13 +81,16 @@ class Law:
         self.count = len(states)
         self.expression, self.time_harmonic = _with_phase(expression, where)
         taken = {*self.q, self.phase}
-        for one in sorted(self.expression.free_symbols - taken, key=str):
+        self.c: list[Any] = [symbol(name) for name in coefficients]
+        self.c = self.c or sorted(self.expression.free_symbols - taken, key=str)
+        for one in self.c:
             if PRIME in one.name:
                 raise InputError(f"{where}: {one.name.replace(PRIME, chr(39))} cannot occur in a force")
         if self.expression.count_ops() > _OPERATIONS:
             raise InputError(f"{where}: more than {_OPERATIONS} operations; split it into several elements")
-        self.c: list[Any] = sorted(self.expression.free_symbols - taken, key=str)
         self.coefficients = tuple(one.name for one in self.c)
+        self._sorted = sorted(self.c, key=str)
+        self._ranks = [self._sorted.index(one) for one in self.c]
         self.corner_input = 0
         self._degree, self._corner_places = self._smoothness()
         powers = [power for power in self.expression.atoms(sympy.Pow) if not power.exp.is_integer]
@@ -224,15 +232,16 @@ class Law:
 
     def coefficient_tangent(self, q: Array, theta: Array, c: Array) -> tuple[Array, Array]:
         """`(f_c, f_qc)`, shapes (nc, N), (nc, Q, N)."""
-        f, n = self.expression, len(theta)
-        values = self._code("by c", lambda: [d for a in self.c for d in (f.diff(a), *(f.diff(a, b) for b in self.q))])(
-            q, theta, c
-        ).reshape(len(self.c), 1 + len(self.q), n)
-        return values[:, 0], values[:, 1:]
+        f = self.expression
+        values = self._code(
+            "by c", lambda: [d for a in self._sorted for d in (f.diff(a), *(f.diff(a, b) for b in self.q))]
+        )
+        by_c = values(q, theta, c).reshape(len(self.c), 1 + len(self.q), -1)[self._ranks]
+        return by_c[:, 0], by_c[:, 1:]
 
     def coefficient_curvature(self, q: Array, theta: Array, c: Array) -> Array:
         """`f_cc`, (nc, nc, N)."""
-        return self._symmetric("by c twice", self.c, 2, q, theta, c)
+        return self._symmetric("by c twice", self._sorted, 2, q, theta, c)[np.ix_(self._ranks, self._ranks)]
 
 
 @functools.cache
