@@ -34,6 +34,8 @@ _LARGE = 64
 #: keys that say what a mapping stands for
 _MARKS = frozenset({"float", "expression", "array", "stored", "sparse", "mapping", "callable", "type"})
 _DTYPES = ("|b1", *(f"{order}{kind}{size}" for order in "<>|" for kind in "iuf" for size in (1, 2, 4, 8)))
+#: what a matrix in compressed-row form consists of
+_SPARSE = ("data", "indices", "indptr")
 _NO_CODE = "it names Python code, which is used only if you allow it (allow_code=True, or --allow-code)"
 
 
@@ -58,7 +60,11 @@ class Recorded:
             bound = _signature(cls).bind(made, *positional, **named)
         except TypeError:  # unpickling passes none; what is really wrong is refused by __init__
             return made
-        given = {name: _kept(value) for name, value in list(bound.arguments.items())[1:]}
+        # copies: later changes to a list or an array that was given cannot reach them
+        given = {
+            name: copy.deepcopy(value) if isinstance(value, list | dict | np.ndarray | tuple) else value
+            for name, value in list(bound.arguments.items())[1:]
+        }
         for parameter in _signature(cls).parameters.values():
             if parameter.kind is parameter.VAR_KEYWORD:
                 given |= given.pop(parameter.name, {})
@@ -103,11 +109,6 @@ def _shown(value: Any) -> str:
     if callable(value):  # by name: where it lies in memory says nothing
         return getattr(value, "__name__", type(value).__name__)
     return value if isinstance(value, str) else value.text if isinstance(value, Coefficient) else shortened(value)
-
-
-def _kept(value: Any) -> Any:
-    """A value that later changes to a list or an array cannot reach."""
-    return copy.deepcopy(value) if isinstance(value, list | dict | np.ndarray | tuple) else value
 
 
 # ------------------------------------------------------------------------------------------------------------- parts
@@ -155,17 +156,14 @@ def _kind(name: Any, family: str, allow_code: bool) -> type:
     known = known_kinds(family)
     if not isinstance(name, str):
         raise InputError(f"the type of an {family} is a text, not {name!r}")
-    if name in known:
-        return known[name]
-    if ":" in name:
-        module, _, _ = name.partition(":")
+    if name not in known and ":" in name:
         if not allow_code:
             raise InputError(f"the {family} {name!r} is not defined in this process: {_NO_CODE}")
-        _import(module)
+        _import(name.partition(":")[0])
         known = known_kinds(family)
-        if name in known:
-            return known[name]
-    raise InputError(f"there is no {family} {name!r}{suggest(name, known)}")
+    if name not in known:
+        raise InputError(f"there is no {family} {name!r}{suggest(name, known)}")
+    return known[name]
 
 
 def _import(module: str) -> Any:
@@ -181,10 +179,8 @@ def plain_number(value: Any) -> Any:
 
     NotImplemented for anything else.
     """
-    if value is None or isinstance(value, bool | str):
-        return value
-    if isinstance(value, np.bool_):
-        return bool(value)
+    if value is None or isinstance(value, bool | str | np.bool_):
+        return bool(value) if isinstance(value, np.bool_) else value
     if isinstance(value, numbers.Integral):
         return int(value)
     if isinstance(value, numbers.Real):
@@ -203,7 +199,9 @@ def plain_value(value: Any, arrays: Arrays | None = None) -> Any:
     if isinstance(value, np.ndarray):
         return _plain_array(value, arrays)
     if hasattr(value, "tocsr"):
-        return _plain_sparse(value, arrays)
+        rows = value.tocsr()
+        parts = {name: plain_value(np.asarray(getattr(rows, name)), arrays) for name in _SPARSE}
+        return {"sparse": {**parts, "shape": list(rows.shape)}}
     if isinstance(value, list | tuple):
         return [plain_value(item, arrays) for item in value]
     if isinstance(value, Mapping):
@@ -229,10 +227,8 @@ def from_plain(value: Any, arrays: Mapping[str, np.ndarray], allow_code: bool = 
             return float(text)
         case {"expression": str()}:
             return restored(value["expression"], value.get("by", ()))
-        case {"array": _, "dtype": _, "shape": _} | {"stored": str()}:
+        case {"array": _, "dtype": _, "shape": _} | {"stored": str()} | {"sparse": Mapping()}:
             return _read_array(value, arrays)
-        case {"sparse": Mapping()}:
-            return _read_sparse(value, arrays)
         case {"mapping": list() as pairs}:
             return {name: from_plain(item, arrays, allow_code) for name, item in pairs}
         case {"callable": str() as place}:
@@ -283,33 +279,22 @@ def _plain_array(array: np.ndarray, arrays: Arrays | None) -> Any:
     return {"array": array.tolist(), "dtype": array.dtype.str, "shape": list(array.shape)}
 
 
-def _read_array(value: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> np.ndarray:
-    if "stored" in value:
-        if value["stored"] not in arrays:
-            raise InputError(f"the array {value['stored']!r} that the description refers to is missing")
-        return np.array(arrays[value["stored"]])
+def _read_array(value: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> Any:
+    """An array, or a sparse matrix."""
     try:
+        if "sparse" in value:
+            import scipy.sparse
+
+            parts = tuple(_read_array(value["sparse"][name], arrays) for name in _SPARSE)
+            return scipy.sparse.csr_array(parts, shape=tuple(value["sparse"]["shape"]))
+        if "stored" in value:
+            if value["stored"] not in arrays:
+                raise InputError(f"the array {value['stored']!r} that the description refers to is missing")
+            return np.array(arrays[value["stored"]])
         if value["dtype"] not in _DTYPES:
             raise ValueError(f"no array of {value['dtype']!r}")
         return np.array(value["array"], dtype=value["dtype"]).reshape(value["shape"])
-    except (KeyError, TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"this is not an array: {error}") from None
-
-
-def _plain_sparse(matrix: Any, arrays: Arrays | None) -> dict[str, Any]:
-    rows = matrix.tocsr()
-    parts = {name: plain_value(np.asarray(getattr(rows, name)), arrays) for name in ("data", "indices", "indptr")}
-    return {"sparse": {**parts, "shape": list(rows.shape)}}
-
-
-def _read_sparse(value: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> Any:
-    import scipy.sparse
-
-    inside = value["sparse"]
-    try:
-        parts = tuple(_read_array(inside[name], arrays) for name in ("data", "indices", "indptr"))
-        return scipy.sparse.csr_array(parts, shape=tuple(inside["shape"]))
     except InputError:
         raise
     except (KeyError, TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"this is not a sparse matrix: {error}") from None
+        raise InputError(f"this is not an array: {error}") from None

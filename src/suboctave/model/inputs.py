@@ -76,9 +76,8 @@ def check_parameter(system: System, name: str) -> None:
 
 def check_count(name: str, value: Any, least: int = 1) -> int:
     """A whole number of at least so much."""
-    exact = isinstance(value, int | np.integer) and not isinstance(value, bool)
-    whole = exact or (not isinstance(value, bool) and is_number(value) and float(value).is_integer())
-    if not whole or value < least:
+    exact = isinstance(value, int | np.integer) or (is_number(value) and float(value).is_integer())
+    if isinstance(value, bool) or not exact or value < least:
         enough = f" of at least {least}" if least > 1 else ""
         raise InputError(f"{name} must be a {'positive ' * (least == 1)}whole number{enough}, not {shortened(value)}")
     if value > _MOST:
@@ -96,12 +95,11 @@ def check_element(system: System, element: Any, gapped: Sequence[int] | None = N
     known = range(len(system.elements)) if gapped is None else gapped
     listed = "; ".join(f"{index}: {system.elements[index].label}" for index in known[:8])
     what = "elements" if gapped is None else "elements with a gap"
+    if element is None and len(known) == 1:
+        return known[0]
     if element is None:
-        if len(known) == 1:
-            return known[0]
-        raise InputError(
-            f"the system has no {what}" if not known else f"several {what}: choose one by its index ({listed})"
-        )
+        several = f"several {what}: choose one by its index ({listed})"
+        raise InputError(several if known else f"the system has no {what}")
     if isinstance(element, bool) or not isinstance(element, int | np.integer):
         raise InputError(f"element must be an index, not {element!r} ({listed})")
     if not 0 <= element < len(system.elements):
@@ -121,12 +119,11 @@ def check_omega(omega: Any) -> float:
 def check_bounds(system: System, name: str, bounds: Any) -> tuple[float, float]:
     """Two ends at each of which the system exists (a mass that vanishes or turns negative does not)."""
     first, last = check_range(name, bounds, positive=name == "omega")
-    if name != "omega":
-        for end in (first, last):
-            try:
-                system.with_parameters({name: end})
-            except InputError as failure:
-                raise InputError(f"{name}=({first:g}, {last:g}): at {name}={end:g} {failure}") from None
+    for end in (first, last) if name != "omega" else ():
+        try:
+            system.with_parameters({name: end})
+        except InputError as failure:
+            raise InputError(f"{name}=({first:g}, {last:g}): at {name}={end:g} {failure}") from None
     return first, last
 
 
@@ -135,12 +132,9 @@ def start_state(system: System, state: Any) -> Array:
     check_is_system(system)
     if state is None:
         return np.zeros(2 * system.n)
-    for name in ("start", "state"):
-        held = getattr(state, name, None)
-        if held is not None and not isinstance(state, np.ndarray):
-            state = held() if callable(held) else held
-            break
-    array = numbers_of(state)
+    held = (getattr(state, name, None) for name in ("start", "state") if not isinstance(state, np.ndarray))
+    given = next((one for one in held if one is not None), state)
+    array = numbers_of(given() if callable(given) else given)
     if array.shape != (2 * system.n,) or not np.isfinite(array).all():
         raise InputError(f"state must be {2 * system.n} finite numbers, displacements and then velocities")
     return array

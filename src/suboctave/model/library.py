@@ -7,8 +7,11 @@ tracked.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from typing import Any
 
 from suboctave.errors import InputError
+from suboctave.model.elements.base import BaseElement
 from suboctave.model.elements.coupled import Expression
 from suboctave.model.elements.springs import CubicSpring
 from suboctave.model.elements.stops import ElasticStop
@@ -27,6 +30,18 @@ __all__ = [
 ]
 
 
+def _forced(
+    name: str,
+    parameters: dict[str, float],
+    elements: Sequence[BaseElement],
+    matrices: tuple[Any, Any, Any] = ("m", "c", "k"),
+    amplitude: str = "F",
+    dof: int = 0,
+) -> System:
+    """A system under `amplitude cos(omega t)` at `dof`; `matrices`: mass, damping, stiffness."""
+    return System(*matrices, elements, [HarmonicLoad(dof=dof, amplitude=amplitude)], parameters, name)
+
+
 def reference_oscillator(
     zeta: float = 0.03,
     alpha: float = 0.16,
@@ -42,19 +57,13 @@ def reference_oscillator(
     Baguet, Prabel, Piteau, Jacquet-Richardet, Nonlinear Dynamics 98 (2019), Eqs. (40) to (42), Table 1, with the sign
     of the first Heaviside function mended.
     """
-    return System(
-        mass=1.0,
-        damping="2*zeta",
-        stiffness=1.0,
-        elements=[
-            CubicSpring(dof=0, coefficient="alpha"),
-            ElasticStop(dof=0, stiffness="Kc", gap="j", side="right", regularization=regularization),
-            ElasticStop(dof=0, stiffness="Kc", gap=-1.0, regularization=regularization),
-        ],
-        loads=[HarmonicLoad(dof=0, amplitude="p")],
-        parameters={"zeta": zeta, "alpha": alpha, "Kc": Kc, "j": j, "p": p},
-        name="reference oscillator",
-    )
+    elements = [
+        CubicSpring(dof=0, coefficient="alpha"),
+        ElasticStop(dof=0, stiffness="Kc", gap="j", side="right", regularization=regularization),
+        ElasticStop(dof=0, stiffness="Kc", gap=-1.0, regularization=regularization),
+    ]
+    parameters = {"zeta": zeta, "alpha": alpha, "Kc": Kc, "j": j, "p": p}
+    return _forced("reference oscillator", parameters, elements, (1.0, "2*zeta", 1.0), "p")
 
 
 def reference_oscillator_physical(
@@ -73,21 +82,15 @@ def reference_oscillator_physical(
     Stops of stiffness `kc` at `x = -gap1` (left) and `x = gap2` (right). `regularization` in 1 / length. Source:
     Alcorta et al. 2019, Eq. (38).
     """
-    return System(
-        mass="m",
-        damping="c",
-        stiffness="k",
-        elements=[
-            CubicSpring(dof=0, coefficient="alpha"),
-            ElasticStop(dof=0, stiffness="kc", gap="gap2", side="right", regularization=regularization),
-            ElasticStop(dof=0, stiffness="kc", gap="-gap1", side="left", regularization=regularization),
-        ],
-        loads=[HarmonicLoad(dof=0, amplitude="force")],
-        parameters={
-            "m": m, "c": c, "k": k, "alpha": alpha, "kc": kc, "gap1": gap1, "gap2": gap2, "force": force,
-        },
-        name="reference oscillator (physical)",
-    )  # fmt: skip
+    elements = [
+        CubicSpring(dof=0, coefficient="alpha"),
+        ElasticStop(dof=0, stiffness="kc", gap="gap2", side="right", regularization=regularization),
+        ElasticStop(dof=0, stiffness="kc", gap="-gap1", side="left", regularization=regularization),
+    ]
+    parameters = {
+        "m": m, "c": c, "k": k, "alpha": alpha, "kc": kc, "gap1": gap1, "gap2": gap2, "force": force,
+    }  # fmt: skip
+    return _forced("reference oscillator (physical)", parameters, elements, amplitude="force")
 
 
 def nondimensional(
@@ -122,15 +125,8 @@ def nondimensional(
 
 def duffing(c: float = 0.05, k: float = 1.0, alpha: float = 1.0, F: float = 1.0, m: float = 1.0) -> System:
     """Duffing's oscillator, `m x'' + c x' + k x + alpha x^3 = F cos(omega t)`; softening if `alpha` is negative."""
-    return System(
-        mass="m",
-        damping="c",
-        stiffness="k",
-        elements=[CubicSpring(dof=0, coefficient="alpha")],
-        loads=[HarmonicLoad(dof=0, amplitude="F")],
-        parameters={"m": m, "c": c, "k": k, "alpha": alpha, "F": F},
-        name="Duffing oscillator",
-    )
+    parameters = {"m": m, "c": c, "k": k, "alpha": alpha, "F": F}
+    return _forced("Duffing oscillator", parameters, [CubicSpring(dof=0, coefficient="alpha")])
 
 
 def mathieu_duffing(
@@ -142,18 +138,9 @@ def mathieu_duffing(
     loses its stability: by a period doubling around `omega = 2 sqrt(k/m)`, where `eps` exceeds about `2 c / sqrt(k m)`
     (Nayfeh & Mook, Nonlinear Oscillations, Wiley 1979, section 5.2).
     """
-    return System(
-        mass="m",
-        damping="c",
-        stiffness="k",
-        elements=[
-            CubicSpring(dof=0, coefficient="gamma"),
-            Expression(dof=0, expression="k*eps*cos(omega*t)*x"),
-        ],
-        loads=[HarmonicLoad(dof=0, amplitude="F")],
-        parameters={"m": m, "c": c, "k": k, "eps": eps, "gamma": gamma, "F": F},
-        name="Mathieu-Duffing oscillator",
-    )
+    elements = [CubicSpring(dof=0, coefficient="gamma"), Expression(dof=0, expression="k*eps*cos(omega*t)*x")]
+    parameters = {"m": m, "c": c, "k": k, "eps": eps, "gamma": gamma, "F": F}
+    return _forced("Mathieu-Duffing oscillator", parameters, elements)
 
 
 def jeffcott_rotor(
@@ -179,16 +166,9 @@ def jeffcott_rotor(
             Expression(dof, f"kc*max({radius} - clearance, 0)*{name}/{radius}", inputs={"x": 0, "y": 1})
             for dof, name in enumerate("xy")
         ]
-    return System(
-        mass=[["m", 0.0], [0.0, "m"]],
-        damping=[["c", 0.0], [0.0, "c"]],
-        stiffness=[["k", 0.0], [0.0, "k"]],
-        elements=rubbing,
-        loads=[RotatingUnbalance(dof=0, mass_eccentricity="me", perpendicular=1)],
-        parameters=parameters,
-        name="Jeffcott rotor",
-        dof_names=("x", "y"),
-    )
+    mass, damping, stiffness = ([[one, 0.0], [0.0, one]] for one in "mck")
+    unbalance = RotatingUnbalance(dof=0, mass_eccentricity="me", perpendicular=1)
+    return System(mass, damping, stiffness, rubbing, [unbalance], parameters, "Jeffcott rotor", ("x", "y"))
 
 
 def nltva(F: float = 0.11) -> System:
@@ -198,19 +178,15 @@ def nltva(F: float = 0.11) -> System:
     Kerschen, Mechanical Systems and Signal Processing 52-53 (2015); its response, quasi-periodic motions and isola:
     Detroux, Habib, Masset, Kerschen, the same journal 60-61 (2015). No units.
     """
-    return System(
-        mass=[["m1", 0.0], [0.0, "m2"]],
-        damping=[["c1 + c2", "-c2"], ["-c2", "c2"]],
-        stiffness=[["k1 + k2", "-k2"], ["-k2", "k2"]],
-        elements=[CubicSpring(dof=0, coefficient="knl1"), CubicSpring(dof=(0, 1), coefficient="knl2")],
-        loads=[HarmonicLoad(dof=0, amplitude="F")],
-        parameters={
-            "m1": 1.0, "c1": 0.002, "k1": 1.0, "knl1": 1.0,
-            "m2": 0.05, "c2": 0.0128, "k2": 0.0454, "knl2": 0.0042,
-            "F": F,
-        },
-        name="nonlinear tuned vibration absorber",
-    )  # fmt: skip
+    parameters = {
+        "m1": 1.0, "c1": 0.002, "k1": 1.0, "knl1": 1.0,
+        "m2": 0.05, "c2": 0.0128, "k2": 0.0454, "knl2": 0.0042,
+        "F": F,
+    }  # fmt: skip
+    elements = [CubicSpring(dof=0, coefficient="knl1"), CubicSpring(dof=(0, 1), coefficient="knl2")]
+    damping, stiffness = ([[f"{x}1 + {x}2", f"-{x}2"], [f"-{x}2", f"{x}2"]] for x in "ck")
+    matrices = [["m1", 0.0], [0.0, "m2"]], damping, stiffness
+    return _forced("nonlinear tuned vibration absorber", parameters, elements, matrices)
 
 
 def two_mass_unilateral(
@@ -223,12 +199,11 @@ def two_mass_unilateral(
     Harmonic Balance for Nonlinear Vibration Problems, Springer 2019, and example 3 of its toolbox NLvib (omega from 0.5
     to 0.8, with limit points, period doublings and Neimark-Sacker points).
     """
-    return System(
-        mass=[[1.0, 0.0], [0.0, 1.0]],
-        damping=[["damping", "-damping"], ["-damping", "2*damping"]],
-        stiffness=[[1.0, -1.0], [-1.0, 2.0]],
-        elements=[ElasticStop(dof=0, stiffness="Kc", gap="gap", side="right", regularization=regularization)],
-        loads=[HarmonicLoad(dof=1, amplitude="F")],
-        parameters={"damping": damping, "Kc": Kc, "gap": gap, "F": F},
-        name="two masses with a one-sided stop",
+    elements = [ElasticStop(dof=0, stiffness="Kc", gap="gap", side="right", regularization=regularization)]
+    parameters = {"damping": damping, "Kc": Kc, "gap": gap, "F": F}
+    matrices = (
+        [[1.0, 0.0], [0.0, 1.0]],
+        [["damping", "-damping"], ["-damping", "2*damping"]],
+        [[1.0, -1.0], [-1.0, 2.0]],
     )
+    return _forced("two masses with a one-sided stop", parameters, elements, matrices, dof=1)

@@ -16,7 +16,7 @@ import operator
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,7 +27,6 @@ from suboctave.model.elements.base import Array, Dof, Place, required
 from suboctave.model.expressions.coefficients import ZERO, Coefficient, Number, coefficient, named_coefficient
 from suboctave.model.matrices import MatrixCoefficient
 
-_QUARTER = coefficient("-pi/2")
 #: far above what harmonic balance has unknowns for; angles of higher ones would lose digits in time integration
 _HIGHEST = 10_000
 #: mass, damping and stiffness of the structure that a load acts on
@@ -45,6 +44,9 @@ class LoadComponent:
 
     def __post_init__(self) -> None:
         self.direction.setflags(write=False)
+
+
+Components: TypeAlias = tuple[LoadComponent, ...]
 
 
 class Load(Recorded, ABC, family="load"):
@@ -67,7 +69,7 @@ class Load(Recorded, ABC, family="load"):
         return tuple((name, getattr(self, name)) for name in self.coefficient_names)
 
     @abstractmethod
-    def components(self, n: int, matrices: Matrices) -> tuple[LoadComponent, ...]:
+    def components(self, n: int, matrices: Matrices) -> Components:
         """Its cosines in a structure of n degrees of freedom; constant parts are of harmonic 0.
 
         `matrices`: those of the structure, for loads of inertia and of moving bases.
@@ -122,11 +124,10 @@ class HarmonicLoad(Load):
                 f"{self.label}: {len(amplitudes)} of amplitude, {len(harmonics)} of harmonic, {len(phases)} of phase; "
                 f"give as many of each (a single phase serves all)"
             )
-        if len(phases) == 1:
-            phases *= len(amplitudes)
         self.amplitudes = tuple(named_coefficient(given, self.label, "amplitude") for given in amplitudes)
         self.harmonics = tuple(self._read_harmonic(given) for given in harmonics)
-        self.phases = tuple(named_coefficient(given, self.label, "phase") for given in phases)
+        read = tuple(named_coefficient(given, self.label, "phase") for given in phases)
+        self.phases = read * (len(amplitudes) if len(phases) == 1 else 1)
         self.static = named_coefficient(static, self.label, "static")
 
     @property
@@ -139,16 +140,12 @@ class HarmonicLoad(Load):
         """The vector (n,) along which the load acts."""
         return self.place.direction(n)
 
-    def components(self, n: int, matrices: Matrices) -> tuple[LoadComponent, ...]:
-        """The cosines of this load, the static part last (harmonic 0)."""
-        direction = self.direction(n)
-        cosines = [
-            LoadComponent(direction, harmonic, amplitude, phase)
-            for amplitude, harmonic, phase in zip(self.amplitudes, self.harmonics, self.phases, strict=True)
-        ]
+    def components(self, n: int, matrices: Matrices) -> Components:
+        """See `Load.components`; the static part comes last."""
+        waves = [*zip(self.harmonics, self.amplitudes, self.phases, strict=True)]
         if not (self.static.constant and self.static.value({}) == 0.0):
-            cosines.append(LoadComponent(direction, 0, self.static, ZERO))
-        return tuple(cosines)
+            waves.append((0, self.static, ZERO))
+        return tuple(LoadComponent(self.direction(n), *wave) for wave in waves)
 
 
 def _listed(given: Any) -> list[Any]:
@@ -170,7 +167,7 @@ class StaticLoad(Load):
         self.place = Place("StaticLoad", dof, direction)
         self._take(force=force)
 
-    def components(self, n: int, matrices: Matrices) -> tuple[LoadComponent, ...]:
+    def components(self, n: int, matrices: Matrices) -> Components:
         return (LoadComponent(self.place.direction(n), 0, self.force, ZERO),)
 
 
@@ -194,18 +191,19 @@ class RotatingUnbalance(Load):
         phase: Number = 0.0,
         harmonic: int = 1,
     ) -> None:
-        places = [Place("RotatingUnbalance", dof, None)]
+        self.place = Place("RotatingUnbalance", dof, None)
+        self.places = [self.place]
         if perpendicular is not None:
-            places.append(Place("RotatingUnbalance, perpendicular", perpendicular, None))
-        if any(len(place.dofs) != 1 for place in places) or len({place.dofs for place in places}) < len(places):
+            self.places.append(Place("RotatingUnbalance, perpendicular", perpendicular, None))
+        taken = [place.dofs for place in self.places]
+        if any(len(dofs) != 1 for dofs in taken) or len(set(taken)) < len(taken):
             raise InputError("RotatingUnbalance: dof and perpendicular must be two different DOFs, one index each")
-        self.place, self.places = places[0], tuple(places)
         self._take(mass_eccentricity=mass_eccentricity, phase=phase)
         self.harmonic = self._read_harmonic(harmonic, 1)
 
-    def components(self, n: int, matrices: Matrices) -> tuple[LoadComponent, ...]:
+    def components(self, n: int, matrices: Matrices) -> Components:
         amplitude = coefficient(f"({self.mass_eccentricity.text}) * {self.harmonic**2} * omega**2")
-        phases = (self.phase, _sum(self.phase, _QUARTER))
+        phases = (self.phase, coefficient(f"({self.phase.text}) + (-pi/2)"))
         return tuple(
             LoadComponent(place.direction(n), self.harmonic, amplitude, phase)
             for place, phase in zip(self.places, phases, strict=False)
@@ -223,14 +221,14 @@ class _WithMatrices(Load):
         return np.ones(n) if self.vector is None else self.vector.direction(n)
 
     def _along(
-        self, matrix: MatrixCoefficient, r: Array, harmonic: int, amplitude: str, phase: Coefficient
-    ) -> list[LoadComponent]:
+        self, matrix: MatrixCoefficient, n: int, amplitude: str, harmonic: int, phase: Coefficient
+    ) -> Components:
         """`matrix r amplitude cos(harmonic omega t + phase)`, one cosine per expression in the matrix."""
-        return [
+        return tuple(
             LoadComponent(vector, harmonic, coefficient(f"({factor.text}) * {amplitude}"), phase)
-            for factor, vector in matrix.products(r)
+            for factor, vector in matrix.products(self.direction(n))
             if np.any(vector)
-        ]
+        )
 
 
 class Gravity(_WithMatrices):
@@ -246,8 +244,8 @@ class Gravity(_WithMatrices):
         super().__init__(direction)
         self._take(acceleration=acceleration)
 
-    def components(self, n: int, matrices: Matrices) -> tuple[LoadComponent, ...]:
-        return tuple(self._along(matrices[0], self.direction(n), 0, f"({self.acceleration.text})", ZERO))
+    def components(self, n: int, matrices: Matrices) -> Components:
+        return self._along(matrices[0], n, f"({self.acceleration.text})", 0, ZERO)
 
 
 class _Base(_WithMatrices):
@@ -275,20 +273,18 @@ class _Base(_WithMatrices):
         self._take(amplitude=amplitude, phase=phase)
         self.harmonic = self._read_harmonic(harmonic, 1)
 
-    def components(self, n: int, matrices: Matrices) -> tuple[LoadComponent, ...]:
+    def components(self, n: int, matrices: Matrices) -> Components:
         mass, damping, stiffness = matrices
-        r, k, given = self.direction(n), self.harmonic, f"({self.amplitude.text})"
+        k, phase, given = self.harmonic, self.phase, f"({self.amplitude.text})"
         frequency = f"({k}*omega)"
         if self.coordinates == "relative":
             # -M r y''; a displacement has y'' = -(k omega)^2 y
             amplitude = f"-1.0 * {given}" if self._order == 0 else f"{given} * {frequency}**2"
-            return tuple(self._along(mass, r, k, amplitude, self.phase))
+            return self._along(mass, n, amplitude, k, phase)
         # y' = k omega amplitude cos(.. + pi / 2); an acceleration has y = -y'' / (k omega)^2
         shown = f"-1.0 * {given} / {frequency}**2" if self._order == 0 else given
-        return (
-            *self._along(stiffness, r, k, shown, self.phase),
-            *self._along(damping, r, k, f"{shown} * {frequency}", _sum(self.phase, coefficient("pi/2"))),
-        )
+        rate = self._along(damping, n, f"{shown} * {frequency}", k, coefficient(f"({phase.text}) + (pi/2)"))
+        return self._along(stiffness, n, shown, k, phase) + rate
 
     def check_elements(self, n: int, elements: Sequence[Any]) -> None:
         """Refuse elements that would need the motion of the base."""
@@ -323,7 +319,3 @@ class BaseAcceleration(_Base):
     """
 
     _order = 0
-
-
-def _sum(a: Coefficient, b: Coefficient) -> Coefficient:
-    return coefficient(f"({a.text}) + ({b.text})")

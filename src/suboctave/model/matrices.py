@@ -75,21 +75,10 @@ class MatrixCoefficient:
     def derivative(self, name: str) -> MatrixCoefficient | None:
         """The derivative by a parameter; None if it is identically zero."""
         if name not in self._derivatives:
-            self._derivatives[name] = self._differentiate(name)
+            slopes = [(c.derivative(name), pattern) for c, pattern in self._terms if name in c.names]
+            slope = _added(self._base, slopes, f"derivative of {self.what} by {name}")
+            self._derivatives[name] = slope if slope.coefficients or abs(slope._base).max() else None
         return self._derivatives[name]
-
-    def _differentiate(self, name: str) -> MatrixCoefficient | None:
-        slopes = [(c.derivative(name), pattern) for c, pattern in self._terms if name in c.names]
-        base = self._base * 0.0
-        terms = []
-        for slope, pattern in slopes:
-            if slope.constant:
-                base = base + slope.value({}) * pattern
-            else:
-                terms.append((slope, pattern))
-        if not terms and not abs(base).max():
-            return None
-        return MatrixCoefficient(base, terms, f"derivative of {self.what} by {name}")
 
     def __repr__(self) -> str:
         kind = "sparse" if self.sparse else "dense"
@@ -193,11 +182,16 @@ def _from_terms(source: Mapping[Any, Any], what: str) -> MatrixCoefficient:
     shapes = {matrix.shape for _, matrix in read}
     if len(shapes) > 1:
         raise InputError(f"{what}: its matrices have different shapes {sorted(shapes)}")
-    base = read[0][1] * 0.0
-    for factor, matrix in read:
+    return _added(read[0][1], read, what)
+
+
+def _added(like: Any, terms: Sequence[tuple[Coefficient, Any]], what: str) -> MatrixCoefficient:
+    """The sum of terms of matrices like this one; those with constant factors are one matrix."""
+    base = like * 0.0
+    for factor, matrix in terms:
         if factor.constant:
             base = base + factor.value({}) * matrix
-    return MatrixCoefficient(base, [(c, matrix) for c, matrix in read if not c.constant], what)
+    return MatrixCoefficient(base, [(c, matrix) for c, matrix in terms if not c.constant], what)
 
 
 # ------------------------------------------------------------------------------------------------------------ checks

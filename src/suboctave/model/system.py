@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import keyword
 import unicodedata
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -60,19 +61,17 @@ class System:
         dof_names: Iterable[str] = (),
     ) -> None:
         read = matrix_coefficient(mass, None, "mass")
-        parts = {
-            "mass": read,
-            "damping": matrix_coefficient(damping, read.n, "damping"),
-            "stiffness": matrix_coefficient(stiffness, read.n, "stiffness"),
-            "elements": tuple(
-                sorted(_several(elements, BaseElement, "Element", "elements"), key=lambda e: e.own_nodes)
-            ),
-            "loads": _several(loads, Load, "HarmonicLoad", "loads"),
-            "parameters": _read_parameters(parameters),
-            "name": str(name),
-            "dof_names": _read_dof_names(dof_names, read.n),
-        }
-        self._fill(parts, check=True)
+        self._fill(
+            check=True,
+            mass=read,
+            damping=matrix_coefficient(damping, read.n, "damping"),
+            stiffness=matrix_coefficient(stiffness, read.n, "stiffness"),
+            elements=sorted(_several(elements, BaseElement, "Element", "elements"), key=lambda e: e.own_nodes),
+            loads=_several(loads, Load, "HarmonicLoad", "loads"),
+            parameters=_read_parameters(parameters),
+            name=str(name),
+            dof_names=_read_dof_names(dof_names, read.n),
+        )
         self._check_values(self.parameters)
 
     @classmethod
@@ -94,20 +93,19 @@ class System:
         read = _read_parameters(parameters)
         return cls(**parts_of(equations, read), parameters=read, name=name)
 
-    def _fill(self, parts: Mapping[str, Any], check: bool) -> None:
-        """Take parts; `check`: whether they fit each other, where no system has accepted them already."""
-        n = parts["mass"].n
-        for field, value in {**parts, "n": n, "parameters": MappingProxyType(dict(parts["parameters"]))}.items():
-            object.__setattr__(self, field, value)
-        refusals = Refusals()
-        components: list[LoadComponent] = []
-        for i, load in enumerate(self.loads):
+    def _fill(self, check: bool, **parts: Any) -> None:
+        """Take all parts; `check`: whether they fit each other, where no system has accepted them already."""
+        refusals, components = Refusals(), []
+        for i, load in enumerate(parts["loads"]):
             with refusals.at("loads", i):
-                components += load.components(n, (self.mass, self.damping, self.stiffness))
+                components += load.components(parts["mass"].n, tuple(parts[what] for what in _MATRICES))
+        parts |= {kind: tuple(parts[kind]) for kind in ("elements", "loads")}
+        parts |= {"n": parts["mass"].n, "parameters": MappingProxyType(dict(parts["parameters"]))}
+        for field, value in {**parts, "_components": tuple(components)}.items():
+            object.__setattr__(self, field, value)
         if check:
             self._check_parts(refusals)
         refusals.refuse()
-        object.__setattr__(self, "_components", tuple(components))
 
     # ------------------------------------------------------------------------------------------------- parameters
     def with_parameters(self, changes: Mapping[str, float] | None = None, /, **more: float) -> System:
@@ -150,7 +148,7 @@ class System:
 
     def _changed(self, **parts: Any) -> System:
         """A system with these parts in the place of its own."""
-        return _assemble({field: getattr(self, field) for field in _PARTS} | parts)
+        return _assemble(**{field: getattr(self, field) for field in _PARTS} | parts)
 
     def check_parameter(self, name: str) -> None:
         """Raise `InputError`, with a suggestion, if there is no parameter of this name."""
@@ -240,18 +238,14 @@ class System:
         """
         if len(names) not in (1, 2):
             raise InputError(f"matrix_derivatives takes one or two names of parameters, got {len(names)}")
+        matrices: list[MatrixCoefficient | None] = [self.mass, self.damping, self.stiffness]
         for name in names:
             if name != "omega":
                 self.check_parameter(name)
+            matrices = [matrix and matrix.derivative(name) for matrix in matrices]
         at = self.parameters if values is None else values
-
-        def differentiated(matrix: MatrixCoefficient | None) -> Array | None:
-            for name in names:
-                if matrix is not None:
-                    matrix = matrix.derivative(name)
-            return None if matrix is None else matrix.value(at)
-
-        return differentiated(self.mass), differentiated(self.damping), differentiated(self.stiffness)
+        mass, damping, stiffness = (None if matrix is None else matrix.value(at) for matrix in matrices)
+        return mass, damping, stiffness
 
     # ------------------------------------------------------------------------------------------------------ loads
     def load_components(self) -> tuple[LoadComponent, ...]:
@@ -276,22 +270,20 @@ class System:
     @property
     def observed_dof(self) -> int:
         """The degree of freedom watched by default: where the first load acts most (a non-static one if any)."""
-        for component in (*(c for c in self._components if c.harmonic > 0), *self._components):
-            return int(np.argmax(np.abs(component.direction)))
-        for element in self.elements:  # without loads: what time acts on
-            if element.depends_on_time:
-                return int(np.argmax(np.abs(element.direction(self.n))))
-        return 0
+        acting = [c.direction for c in sorted(self._components, key=lambda c: c.harmonic == 0)]
+        # without loads: what time acts on
+        acting += [element.direction(self.n) for element in self.elements if element.depends_on_time]
+        return int(np.argmax(np.abs(acting[0]))) if acting else 0
 
     # ------------------------------------------------------------------------------------------------------ object
-    def __setattr__(self, name: str, value: Any) -> None:
+    def __setattr__(self, name: str, value: Any = None) -> None:
         raise AttributeError("a System does not change; with_parameters() gives one with other parameters")
 
-    def __delattr__(self, name: str) -> None:
-        raise AttributeError("a System does not change")
+    __delattr__ = __setattr__
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _assemble, ({field: getattr(self, field) for field in _PARTS} | {"parameters": dict(self.parameters)},)
+        parts = {field: getattr(self, field) for field in _PARTS} | {"parameters": dict(self.parameters)}
+        return functools.partial(_assemble, **parts), ()
 
     def __repr__(self) -> str:
         title = f"System {self.name!r}" if self.name else "System"
@@ -306,21 +298,19 @@ class System:
         return "\n".join(lines)
 
 
-def _assemble(parts: Mapping[str, Any], check: bool = False) -> System:
-    """A system from all of its parts by name."""
+def _assemble(check: bool = False, **parts: Any) -> System:
+    """A system from all of its parts."""
     result = object.__new__(System)
-    result._fill(parts, check)
+    result._fill(check, **parts)
     return result
 
 
 def _several(items: Any, kind: type, name: str, what: str) -> tuple[Any, ...]:
     if isinstance(items, kind):
         return (items,)
-    try:
-        listed = tuple(items)
-    except TypeError:
-        raise InputError(f"{what} must be a sequence of {name}, not {items!r}") from None
-    for item in listed:
+    if not isinstance(items, Iterable):
+        raise InputError(f"{what} must be a sequence of {name}, not {items!r}")
+    for item in (listed := tuple(items)):
         if not isinstance(item, kind):
             raise InputError(f"{what} must hold objects of the kind {name}, not {item!r}")
     return listed
@@ -390,8 +380,8 @@ def build(
         parts: dict[str, Any] = {what: _read_matrix(description[what], what, arrays or {}) for what in _MATRICES}
         for family in ("element", "load"):
             items = description[f"{family}s"]
-            parts[f"{family}s"] = tuple(build_part(item, family, arrays or {}, allow_code) for item in items)
-        parts |= {"parameters": description["parameters"], "name": str(description["name"])}
+            parts[f"{family}s"] = [build_part(item, family, arrays or {}, allow_code) for item in items]
+        parts |= {"parameters": _read_parameters(description["parameters"]), "name": str(description["name"])}
         parts["dof_names"] = _read_dof_names(description["dof_names"], parts["mass"].n)
     except InputError:
         raise
@@ -399,7 +389,7 @@ def build(
         raise InputError(f"this is not the description of a system: {type(error).__name__} {error}") from None
     if len({parts[what].n for what in _MATRICES}) > 1:
         raise InputError("this is not the description of a system: its matrices have different sizes")
-    system = _assemble(parts | {"parameters": _read_parameters(parts["parameters"])}, check=True)
+    system = _assemble(check=True, **parts)
     system._check_values({})  # as for other parameters of a known system: the sides of its stops are as they are
     check_mass(system.mass.compact(system.parameters))
     return system

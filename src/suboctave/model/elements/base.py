@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from suboctave.errors import InputError, located
 from suboctave.model.description import Recorded
 from suboctave.model.elements.batch_form import BatchForm, CalledBack, form_of_sampling
-from suboctave.model.elements.smoothness import Sampling, SharpSampling, SharpVelocitySampling, WholeLaw
+from suboctave.model.elements.smoothness import Sampling, WholeLaw, widths_of
 from suboctave.model.expressions.coefficients import Coefficient, Number, named_coefficient
 
 Array: TypeAlias = NDArray[np.float64]
@@ -43,10 +43,13 @@ class Place:
         self.owner = owner
         if (dof is None) == (direction is None):
             raise InputError(f"{owner} needs either dof= (one index, or a pair) or direction= (a vector), not both")
-        with located("dof"):
-            self.dofs: tuple[int, ...] = () if dof is None else self._read_dofs(dof)
-        with located("direction"):
-            self.vector: Array | None = None if direction is None else self._read_vector(direction)
+        self.dofs: tuple[int, ...] = ()
+        self.vector: Array | None = None
+        with located("direction" if dof is None else "dof"):
+            if dof is None:
+                self.vector = self._read_vector(direction)
+            else:
+                self.dofs = self._read_dofs(dof)
 
     def _read_dofs(self, dof: Dof) -> tuple[int, ...]:
         entries = tuple(dof) if isinstance(dof, Sequence | np.ndarray) else (dof,)
@@ -59,7 +62,7 @@ class Place:
             raise InputError(f"{self.owner}: dof={dofs} couples a degree of freedom with itself")
         return dofs
 
-    def _read_vector(self, direction: ArrayLike) -> Array:
+    def _read_vector(self, direction: Any) -> Array:
         vector = numbers_of(direction)
         if vector.ndim != 1 or not np.all(np.isfinite(vector)) or not np.any(vector):
             raise InputError(f"{self.owner}: direction must be a vector of finite numbers, not all zero")
@@ -225,12 +228,10 @@ class Element(BaseElement):
 
         Unless a subclass knows better: differences of `curvature`, good for about eight digits of smooth laws.
         """
-        kind = self.sampling(c)
-        narrow = min(kind.widths, default=np.inf) if isinstance(kind, SharpSampling) else np.inf
+        narrow, slow = widths_of(self.sampling(c))
         f_uuu = central_difference(lambda h: self.curvature(u + h, v, c)[0], step_of(u, narrow))
         if not self.depends_on_velocity:
             return f_uuu, None, None, None
-        slow = min(kind.widths, default=np.inf) if isinstance(kind, SharpVelocitySampling) else np.inf
         by_v = central_difference(lambda h: np.array(self.curvature(u, v + h, c)), step_of(v, slow))
         return f_uuu, by_v[0], by_v[1], by_v[2]
 
@@ -239,22 +240,19 @@ class DeclaredElement(Element):
     """An element without velocity whose smoothness class is all of its law (`whole`): that evaluates it."""
 
     @abstractmethod
-    def law_at(self, c: Array) -> WholeLaw:
+    def sampling(self, c: Array) -> WholeLaw:
         """The law at these coefficients."""
 
-    def sampling(self, c: Array) -> Sampling:
-        return self.law_at(c)
-
     def tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, None]:
-        return *self.law_at(c).tangent(u, c), None
+        return *self.sampling(c).tangent(u, c), None
 
     def curvature(self, u: Array, v: Array, c: Array) -> tuple[Array, None, None]:
         """`f_uu`; at corners its regular part."""
-        return self.law_at(c).curvature(u, c), None, None
+        return self.sampling(c).curvature(u, c), None, None
 
     def third(self, u: Array, v: Array, c: Array) -> tuple[Array, None, None, None]:
         """`f_uuu`; at corners its regular part."""
-        return self.law_at(c).third(u, c), None, None, None
+        return self.sampling(c).third(u, c), None, None, None
 
 
 def required(owner: str, **given: Any) -> None:
@@ -274,9 +272,9 @@ def central_difference(law: Callable[[float], Any], step: float) -> Any:
     return (8.0 * (law(step) - law(-step)) - (law(2.0 * step) - law(-2.0 * step))) / (12.0 * step)
 
 
-def step_of(at: Any, width: float = np.inf) -> float:
+def step_of(at: Any, widths: Sequence[float] = ()) -> float:
     """The step for an argument `at` of a law that changes over its largest size, or over a smaller width."""
-    return STEP * min(float(np.max(np.abs(at), initial=0.0)) or 1.0, width)
+    return STEP * min(float(np.max(np.abs(at), initial=0.0)) or 1.0, *widths, np.inf)
 
 
 def shifted(at: Any, i: Any, by: float) -> Any:

@@ -16,21 +16,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from suboctave.model.elements.smoothness import (
-    PiecewiseLinear,
-    PolynomialSampling,
-    Sampling,
-    SharpSampling,
-    levels,
-)
+from suboctave.model.elements.smoothness import PiecewiseLinear, PolynomialSampling, Sampling, SharpSampling, levels
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Names:
-    """What the arguments of a law are called: displacements, rates, their rates, numbers, and a prefix for new
-    names."""
+    """What the arguments of a law are called: displacements q, rates r, their rates a, numbers; prefix of new names."""
 
     q: Sequence[str]
     r: Sequence[str]
@@ -51,10 +44,9 @@ class Tangent:
 
 
 class BatchForm(ABC):
-    """The law of one element as code.
+    """The law of one element as code: `count` numbers depend on the parameters, `corners` may be located.
 
-    `count` numbers depend on the parameters, `corners` are places that an integrator may locate; `has_code` is False
-    where the element's `tangent` is called back instead.
+    `has_code` is False where the element's `tangent` is called back instead.
     """
 
     count: int = 0
@@ -83,12 +75,10 @@ class BatchForm(ABC):
 class PolynomialForm(BatchForm):
     """`sum_p c_p u^p`."""
 
-    def __init__(self, degree: int) -> None:
-        self.count = degree + 1
+    def __init__(self, sampling: PolynomialSampling) -> None:
+        self.count = sampling.degree + 1
 
-    def numbers(self, c: Array, sampling: Sampling) -> list[float]:
-        assert isinstance(sampling, PolynomialSampling)
-        assert sampling.coefficients is not None
+    def numbers(self, c: Array, sampling: Any) -> list[float]:
         return list(sampling.coefficients)
 
     def tangent(self, names: Names) -> Tangent:
@@ -104,13 +94,11 @@ class PolynomialForm(BatchForm):
 class ArctanForm(BatchForm):
     """`constant + slope u + sum_i k_i / pi [y_i atan(s_i y_i) - ln(1 + (s_i y_i)^2) / (2 s_i)]`, y_i = u - b_i."""
 
-    def __init__(self, steps: int) -> None:
-        self.steps = self.corners = steps
-        self.count = 2 + 4 * steps
+    def __init__(self, sampling: SharpSampling) -> None:
+        self.corners = len(sampling.points)
+        self.count = 2 + 4 * self.corners
 
-    def numbers(self, c: Array, sampling: Sampling) -> list[float]:
-        assert isinstance(sampling, SharpSampling)
-        assert sampling.steps is not None
+    def numbers(self, c: Array, sampling: Any) -> list[float]:
         out = [sampling.constant, sampling.slope]
         for point, width, step in zip(sampling.points, sampling.widths, sampling.steps, strict=True):
             out += [point, 1.0 / width, step / math.pi, 0.5 * step * width / math.pi]
@@ -119,7 +107,7 @@ class ArctanForm(BatchForm):
     def tangent(self, names: Names) -> Tangent:
         u, c, p = names.q[0], names.number, names.prefix
         lines, force, slope = [], f"{c(0)} + {c(1)} * {u}", c(1)
-        for i in range(self.steps):
+        for i in range(self.corners):
             b = 2 + 4 * i
             lines.append(f"{p}y{i} = {u} - {c(b)}")
             lines.append(f"{p}a{i}, {p}l{i} = arctan_log({c(b + 1)} * {p}y{i})")
@@ -134,20 +122,18 @@ class ArctanForm(BatchForm):
 class PiecesForm(BatchForm):
     """Springs on half-lines, `k_i (u - b_i)` where `side_i (u - b_i) > 0`."""
 
-    def __init__(self, sides: Sequence[int]) -> None:
-        self.sides = tuple(sides)
+    def __init__(self, sampling: PiecewiseLinear) -> None:
+        self.sides = [piece.side for piece in sampling.pieces]
         self.corners = len(self.sides)
         self.count = 2 * self.corners
 
-    def numbers(self, c: Array, sampling: Sampling) -> list[float]:
-        assert isinstance(sampling, PiecewiseLinear)
+    def numbers(self, c: Array, sampling: Any) -> list[float]:
         return [float(c[index]) for piece in sampling.pieces for index in (piece.stiffness, piece.gap)]
 
     def tangent(self, names: Names) -> Tangent:
         lines, force, slope = [], [], []
-        p = names.prefix
         for i, side in enumerate(self.sides):
-            k, y = names.number(2 * i), f"{p}y{i}"
+            k, y = names.number(2 * i), f"{names.prefix}y{i}"
             beyond = f"{y} > 0.0" if side > 0 else f"{y} < 0.0"
             lines.append(f"{y} = {names.q[0]} - {names.number(2 * i + 1)}")
             force.append(f"({k} * {y} if {beyond} else 0.0)")
@@ -179,11 +165,9 @@ class WrittenForm(BatchForm):
         self.places = sorted({atom.args[0] for atom in atoms if atom.free_symbols & states}, key=str)
         self.corners = len(self.places)
 
-    def _states(self, names: Names) -> list[str]:
-        return [*names.q, *(names.r if self.moving else ())]
-
     def _code(self, parts: list[Any], names: Names, flags: dict[str, str] | None = None) -> tuple[list[str], list[str]]:
-        return self.law.scalar_code(parts, self._states(names), names.number, names.prefix, flags or {})
+        states = [*names.q, *(names.r if self.moving else ())]
+        return self.law.scalar_code(parts, states, names.number, names.prefix, flags or {})
 
     def tangent(self, names: Names) -> Tangent:
         return self._tangent(self.law.expression, names, {}, True)
@@ -193,10 +177,9 @@ class WrittenForm(BatchForm):
         return self._tangent(expression, names, flags, slopes)
 
     def _tangent(self, f: Any, names: Names, flags: dict[str, str], slopes: bool) -> Tangent:
-        count = self.law.count
         lines, (force, *by) = self._code([f, *(f.diff(a) for a in self.law.q if slopes)], names, flags)
-        by = by or [""] * count
-        return Tangent(lines, force, by[:count], by[count:] if self.moving and slopes else [""] * count)
+        by += [""] * (2 * self.law.count - len(by))
+        return Tangent(lines, force, by[: self.law.count], by[self.law.count :])
 
     def _frozen(self, names: Names) -> tuple[Any, dict[str, str]]:
         """The expression with flags for what lies beyond its corners, and the code of the flags."""
@@ -249,12 +232,12 @@ class CalledBack(BatchForm):
         return [], f"{names.q[0]} - {names.number(i)}", names.r[0]
 
 
+_FORMS: dict[type, type[Any]] = {
+    PolynomialSampling: PolynomialForm, SharpSampling: ArctanForm, PiecewiseLinear: PiecesForm
+}  # fmt: skip
+
+
 def form_of_sampling(sampling: Sampling, c: Array) -> BatchForm:
     """The law of one displacement as its smoothness class gives it, else called back."""
-    if isinstance(sampling, PolynomialSampling) and sampling.coefficients is not None:
-        return PolynomialForm(sampling.degree)
-    if isinstance(sampling, SharpSampling) and sampling.steps is not None:
-        return ArctanForm(len(sampling.steps))
-    if isinstance(sampling, PiecewiseLinear):
-        return PiecesForm([piece.side for piece in sampling.pieces])
-    return CalledBack(c, sampling)
+    form: BatchForm = _FORMS[type(sampling)](sampling) if sampling.whole else CalledBack(c, sampling)
+    return form

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import warnings
-from collections.abc import Callable as Function, Iterator, Mapping, Sequence
+from collections.abc import Callable as Function, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,8 @@ from suboctave.model.expressions.coefficients import Number
 
 #: step of complex differences
 _COMPLEX = 1e-30
-_CHECKED = 9
+#: displacements and velocities at which a function is tried
+_DRAWS = np.sin(1.3 * np.arange(1, 10)), np.cos(2.1 * np.arange(1, 10))
 #: by which factors that step is shortened until two differences agree, which they do not while a corner lies between
 _SHORTER = (1.0, 0.1, 0.01)
 #: scales of the motions at which given derivatives are checked: what is sharp about zero is seen at the small ones
@@ -47,7 +48,7 @@ class Callable(Element):
     def __init__(
         self,
         dof: Dof | None = None,
-        function: Function[..., Any] | None = None,
+        function: Any = None,
         coefficients: Mapping[str, Number] | None = None,
         derivatives: Function[..., tuple[Any, Any]] | None = None,
         *,
@@ -57,11 +58,10 @@ class Callable(Element):
         for what, given in (("function", function), ("derivatives", derivatives)):
             if given is not None and not callable(given):
                 raise InputError(f"Callable: {what} must be a function of arrays, not {given!r}")
-        named: Sequence[str] = tuple(coefficients or {})
-        self.coefficient_names = tuple(named)
+        self.coefficient_names = tuple(coefficients or {})
         super().__init__(dof, list((coefficients or {}).values()), direction=direction)
-        assert function is not None
-        self.function, self.derivatives = function, derivatives
+        self.function: Function[..., Any] = function
+        self.derivatives = derivatives
         self._complex = derivatives is None and self._bears_complex()
 
     @property
@@ -77,7 +77,7 @@ class Callable(Element):
         """Refuse a function that fails, or does not return finite numbers, or derivatives that are not its own."""
         if not first:
             return
-        u, v = self._draws()
+        u, v = _DRAWS
         c = self.coefficient_values(values)
         f = self._value(u, v, c)
         if not np.all(np.isfinite(f)):
@@ -111,13 +111,9 @@ class Callable(Element):
         for i, k in np.argwhere(np.abs(slopes - settled) > _GIVEN * sizes + doubt):
             yield int(i), int(k), float(settled[i, k])
 
-    def _draws(self) -> tuple[Array, Array]:
-        angles = np.arange(1, _CHECKED + 1)
-        return np.sin(1.3 * angles), np.cos(2.1 * angles)
-
     def _bears_complex(self) -> bool:
         """Whether complex arguments give what differences give, and the same real part."""
-        u, v = self._draws()
+        u, v = _DRAWS
         c = np.where(np.isnan(self._constant), 0.7, self._constant)
         try:
             with _filtering, np.errstate(all="ignore"), warnings.catch_warnings():
@@ -128,7 +124,7 @@ class Callable(Element):
                     return False
                 # a function that drops imaginary parts has slopes of zero
                 slopes = stepped[0].imag / _COMPLEX, stepped[1].imag / _COMPLEX
-                return not any(True for _ in self._disagreements(slopes, u, v, c))
+                return next(self._disagreements(slopes, u, v, c), None) is None
         except Exception:  # the user's function may raise anything on complex numbers
             return False
 
@@ -189,24 +185,20 @@ class Callable(Element):
     def curvature(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, Array]:
         """See `Element.curvature`; by differences."""
         f_uu = central_difference(lambda h: self._slopes(u + h, v, c)[0], step_of(u))
-        f_uv = central_difference(lambda h: self._slopes(u, v + h, c)[0], step_of(v))
-        f_vv = central_difference(lambda h: self._slopes(u, v + h, c)[1], step_of(v))
+        f_uv, f_vv = central_difference(lambda h: np.array(self._slopes(u, v + h, c)), step_of(v))
         return f_uu, f_uv, f_vv
 
     def coefficient_tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, Array]:
         """See `Element.coefficient_tangent`; by differences."""
-
-        def law(c: Array) -> Array:
-            return np.array([self._value(u, v, c), *self._slopes(u, v, c)])
-
-        out = np.zeros((3, len(c), len(u)))
-        for i, value in enumerate(c):
-            out[:, i] = shift_derivative(law, c, i, step_of(value))
-        return out[0], out[1], out[2]
+        f_c, f_uc, f_vc = self._by_coefficients(lambda c: np.array(self.tangent(u, v, c)), (3, len(u)), c)
+        return f_c, f_uc, f_vc
 
     def coefficient_curvature(self, u: Array, v: Array, c: Array) -> Array:
         """See `Element.coefficient_curvature`; by differences."""
-        out = np.zeros((len(c), len(c), len(u)))
-        for i, value in enumerate(c):
-            out[i] = shift_derivative(lambda c: self.coefficient_tangent(u, v, c)[0], c, i, step_of(value))
+        out = self._by_coefficients(lambda c: self.coefficient_tangent(u, v, c)[0], (len(c), len(u)), c)
         return 0.5 * (out + out.transpose(1, 0, 2))
+
+    def _by_coefficients(self, law: Function[[Array], Array], shape: tuple[int, int], c: Array) -> Array:
+        """Derivatives (k, nc, N) of what has the `shape` (k, N) for coefficients c (nc,)."""
+        by_c = [shift_derivative(law, c, i, step_of(value)) for i, value in enumerate(c)]
+        return np.reshape(by_c, (len(c), *shape)).transpose(1, 0, 2)

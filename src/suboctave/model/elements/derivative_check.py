@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,17 +13,8 @@ from numpy.typing import ArrayLike
 from suboctave.errors import InputError, check_numbers, shortened
 from suboctave.model.elements.base import STEP, Array, BaseElement, Element, central_difference, shifted, step_of
 from suboctave.model.elements.coupled import as_coupled
-from suboctave.model.elements.smoothness import (
-    CornerSampling,
-    PiecewiseLinear,
-    PolynomialSampling,
-    SharpSampling,
-    SharpVelocitySampling,
-    WholeLaw,
-    levels,
-)
+from suboctave.model.elements.smoothness import CornerSampling, PiecewiseLinear, WholeLaw, levels, widths_of
 
-Tensor = Callable[[Array, Array], Array]
 #: distance from a corner, in steps: differences reach two of them. Half powers that begin there are steep beside it
 _BESIDE, _BESIDE_ROUGH = 4.0, 100.0
 
@@ -102,8 +94,8 @@ def _places(element: BaseElement, c: Array, u: ArrayLike | None, v: ArrayLike | 
     """Around the gaps or sharp points of the first input, on both sides of each; those beside a corner are left out."""
     kind, m = element.sampling(c), as_coupled(element).count
     points, velocities = levels(kind, c), getattr(kind, "velocities", ())
-    widths = kind.widths if isinstance(kind, SharpSampling) else ()
-    slow = kind.widths if isinstance(kind, SharpVelocitySampling) else ()
+    widths, slow = widths_of(kind)
+    moving = element.depends_on_velocity or isinstance(element, Element)
     reach = max(map(abs, points), default=0.0) or max(widths, default=1.0)
     fast = max(map(abs, velocities), default=0.0) or reach
     if u is None:
@@ -115,12 +107,16 @@ def _places(element: BaseElement, c: Array, u: ArrayLike | None, v: ArrayLike | 
     else:
         rows = list(np.atleast_2d(np.asarray(u, dtype=float)))
         count = np.arange(1, len(rows[0]) + 1)
-    if element.depends_on_velocity or isinstance(element, Element):
+    if moving:
         own = [1.7 * fast * np.cos((1.7 + 0.6 * i) * count) for i in range(m)]
         rows += own if v is None else list(np.atleast_2d(np.asarray(v, dtype=float)))
-    expected = m * (1 + (element.depends_on_velocity or isinstance(element, Element)))
     lengths = {len(row) for row in rows}
-    if len(rows) != expected or len(lengths) > 1 or not len(count) or not np.all(np.isfinite(np.concatenate(rows))):
+    if (
+        len(rows) != m * (1 + moving)
+        or len(lengths) > 1
+        or not len(count)
+        or not np.all(np.isfinite(np.concatenate(rows)))
+    ):
         raise InputError(f"u and v must be finite, with one row of equal length per input, not of {sorted(lengths)}")
     q: Array = np.array(rows)
     if isinstance(kind, PiecewiseLinear | CornerSampling):
@@ -131,7 +127,7 @@ def _places(element: BaseElement, c: Array, u: ArrayLike | None, v: ArrayLike | 
                 q = q[:, np.abs(q[row] - corner) > margin * size]
         if not q.size:
             raise InputError("every place given lies on a corner of the law; give some away from it")
-    steps = [step_of(row, min({0: widths, m: slow}.get(i, ()), default=np.inf)) for i, row in enumerate(q)]
+    steps = [step_of(row, {0: widths, m: slow}.get(i, ())) for i, row in enumerate(q)]
     by_c = STEP * np.array([abs(float(value)) or reach for value in c])
     # a gap moves the whole law: its step follows the width of the law, not its own size
     by_c = np.where(np.isin(c, points), np.minimum(by_c, steps[0]), by_c)
@@ -160,10 +156,8 @@ def _wrong_shapes(element: BaseElement, at: _Places, c: Array) -> list[str]:
             shape = (len(c),) * name.count("c") + (len(at.q),) * name.count("q") + at.theta.shape
             there = element.depends_on_velocity or "v" not in name
             if (value is not None) != there:
-                state_of_it = "missing" if there else "not None"
-                messages.append(
-                    f"{name} is {state_of_it} although depends_on_velocity is {element.depends_on_velocity}"
-                )
+                wrong = "missing" if there else "not None"
+                messages.append(f"{name} is {wrong} although depends_on_velocity is {element.depends_on_velocity}")
             elif there and np.shape(value) != shape:
                 messages.append(f"{name} has shape {np.shape(value)} instead of {shape}")
             elif there and not np.all(np.isfinite(value)):
@@ -178,24 +172,22 @@ def _derivative_errors(element: BaseElement, at: _Places, c: Array) -> dict[str,
     names = names if element.depends_on_velocity else names[: law.count]
     q = at.q[: len(names)]
 
-    def compare(name: str, exact: Array, part: Callable[[float], Array], step: float) -> None:
+    def compare(name: str, exact: Array, tensor: Any, pick: tuple[int, ...], step: float) -> None:
+        def part(h: float) -> Array:
+            return np.asarray(tensor(h)[pick])
+
         difference = central_difference(part, step)
         noise = 1e-15 * float(np.max(np.abs(part(0.0)), initial=0.0)) / step  # what rounding of a constant would show
         largest = max(float(np.max(np.abs(some), initial=0.0)) for some in (exact, difference))
         error = float(np.max(np.abs(difference - exact), initial=0.0))
         errors[name] = max(errors.get(name, 0.0), 0.0 if error <= noise else error / largest)
 
-    def moved(tensor: Tensor, i: int, pick: tuple[int, ...]) -> Callable[[float], Array]:
-        return lambda h: np.asarray(tensor(shifted(q, i, h), c)[pick])
-
-    def changed(tensor: Tensor, k: int, pick: tuple[int, ...]) -> Callable[[float], Array]:
-        return lambda h: np.asarray(tensor(q, shifted(c, k, h))[pick])
-
-    tensors: list[Tensor] = [
+    tensors: list[Callable[[Array, Array], Array]] = [
         lambda q, c: law.tangent(q, theta, c)[0],
         lambda q, c: law.tangent(q, theta, c)[1],
         lambda q, c: law.curvature(q, theta, c),
         lambda q, c: law.third(q, theta, c),
+        lambda q, c: law.coefficient_tangent(q, theta, c)[0],
     ]
     differences_already = isinstance(element, Element) and type(element).third is Element.third
     for order in range(2 if differences_already else 3):
@@ -203,7 +195,9 @@ def _derivative_errors(element: BaseElement, at: _Places, c: Array) -> dict[str,
         for index in itertools.product(range(len(names)), repeat=order + 1):
             *lower, i = index
             name = "f_" + "".join(names[j] for j in sorted(index))
-            compare(name, exact[index], moved(tensors[order], i, tuple(lower)), at.steps[i])
+            compare(
+                name, exact[index], lambda h, i=i, f=tensors[order]: f(shifted(q, i, h), c), tuple(lower), at.steps[i]
+            )
     if isinstance(element, Element) and not element.depends_on_velocity:
         u, v = at.q
         unmoved = central_difference(lambda h: element.tangent(u, v + h, c)[0], at.steps[1]) * at.steps[1]
@@ -211,12 +205,12 @@ def _derivative_errors(element: BaseElement, at: _Places, c: Array) -> dict[str,
     f_c, f_qc = law.coefficient_tangent(q, theta, c)
     f_cc = law.coefficient_curvature(q, theta, c)
     for k, (name, step) in enumerate(zip(element.coefficient_names, at.coefficient_steps, strict=True)):
-        compare(f"f_c[{name}]", f_c[k], changed(tensors[0], k, ()), step)
+        by_c = [lambda h, k=k, tensor=tensor: tensor(q, shifted(c, k, h)) for tensor in tensors]
+        compare(f"f_c[{name}]", f_c[k], by_c[0], (), step)
         for i, state in enumerate(names):
-            compare(f"f_{state}c[{name}]", f_qc[k, i], changed(tensors[1], k, (i,)), step)
+            compare(f"f_{state}c[{name}]", f_qc[k, i], by_c[1], (i,), step)
         for j, other in enumerate(element.coefficient_names):
-            slopes = changed(lambda q, c: law.coefficient_tangent(q, theta, c)[0], k, (j,))
-            compare(f"f_cc[{other}, {name}]", f_cc[j, k], slopes, step)
+            compare(f"f_cc[{other}, {name}]", f_cc[j, k], by_c[-1], (j,), step)
     if element.depends_on_time:
         f, again = (law.tangent(q, phase, c)[0] for phase in (theta, theta + 2.0 * np.pi))
         errors["period"] = float(np.max(np.abs(again - f))) / (float(np.max(np.abs(f))) or 1.0)
@@ -228,6 +222,6 @@ def _smoothness_errors(element: BaseElement, at: _Places, c: Array) -> dict[str,
     kind = element.sampling(c)
     if not (isinstance(element, Element) and isinstance(kind, WholeLaw) and kind.whole):
         return {}
-    name = {PolynomialSampling: "polynomial", SharpSampling: "arctan steps", PiecewiseLinear: "pieces"}[type(kind)]
+    name = {"PolynomialSampling": "polynomial", "SharpSampling": "arctan steps"}.get(type(kind).__name__, "pieces")
     declared, f = kind.tangent(at.q[0], c)[0], element.tangent(at.q[0], at.q[1], c)[0]
     return {name: float(np.max(np.abs(declared - f))) / (float(np.max(np.abs(f))) or 1.0)}

@@ -41,9 +41,8 @@ class PolynomialSampling:
         return self.coefficients is not None
 
     def _derivative(self, order: int, u: Array) -> Array:
-        *lower, top = [math.perm(p, order) * factor for p, factor in enumerate(self.coefficients or ())][order:] or [
-            0.0
-        ]
+        factors = [math.perm(p, order) * factor for p, factor in enumerate(self.coefficients or ())]
+        *lower, top = factors[order:] or [0.0]
         value = np.full_like(u, top)
         for factor in reversed(lower):
             value = value * u + factor if factor else value * u
@@ -195,6 +194,12 @@ class SharpVelocitySampling:
 #: classes that may be all of a law of one displacement
 WholeLaw: TypeAlias = PolynomialSampling | SharpSampling | PiecewiseLinear
 Sampling: TypeAlias = WholeLaw | AdaptiveSampling | CornerSampling | SharpVelocitySampling
+
+
+def widths_of(kind: Sampling) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Over which displacements, and over which velocities, a sharp law changes."""
+    sharp, slow = (kind.widths if isinstance(kind, one) else () for one in (SharpSampling, SharpVelocitySampling))
+    return sharp, slow
 
 
 def switches(sampling: Sampling, c: Array) -> list[tuple[float, int, float | None]]:
