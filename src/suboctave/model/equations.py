@@ -56,6 +56,13 @@ def parts_of(equations: str | Sequence[str], parameters: Mapping[str, float]) ->
 
 
 class _Equations:
+    """The terms of all equations, each in its place.
+
+    A term that is no part of the linear structure and depends on a single combination `u = d . x` (and its rate) is a
+    law of u along that direction d. In one that depends on several displacements u stands for the combination that its
+    corners depend on, if that is one.
+    """
+
     def __init__(self, texts: list[str], parameters: dict[str, float]) -> None:
         self.texts, self.parameters = texts, parameters
         self.names = self._find_names()
@@ -65,6 +72,12 @@ class _Equations:
         self.a = [symbol(name + 2 * PRIME) for name in self.names]
         self.states = {*self.x, *self.v}
         self.t, self.omega = symbol("t"), symbol("omega")
+        self.u, self.rate = symbol("(input)"), symbol("(input)" + PRIME)
+        self.damping, self.stiffness = ([[0] * self.n for _ in range(self.n)] for _ in range(2))
+        self.waves: list[list[tuple[str, int, str]]] = [[] for _ in range(self.n)]
+        self.static: list[Any] = [0] * self.n
+        #: whether other states occur, direction of u (None without), law: the factor in every equation
+        self.laws: dict[tuple[bool, tuple[float, ...] | None, Any], np.ndarray] = {}
 
     def _find_names(self) -> list[str]:
         """The degrees of freedom, in the order in which their accelerations appear."""
@@ -125,11 +138,6 @@ class _Equations:
                     )
         equations = [equation.xreplace(dict.fromkeys(self.a, 0 * self.t)) for equation in equations]
         mass, equations = self._ordered(mass, equations)
-        self.damping: list[list[Any]] = [[0] * self.n for _ in range(self.n)]
-        self.stiffness: list[list[Any]] = [[0] * self.n for _ in range(self.n)]
-        self.waves: list[list[tuple[str, int, str]]] = [[] for _ in range(self.n)]
-        self.static: list[Any] = [0] * self.n
-        self.forces = _Forces(self.names, self.parameters)
         for i, equation in enumerate(equations):
             for term in self._terms(equation):
                 self._sort(i, term)
@@ -137,7 +145,7 @@ class _Equations:
             "mass": _matrix(mass),
             "damping": _matrix(self.damping),
             "stiffness": _matrix(self.stiffness),
-            "elements": self.forces.elements({*self.parameters, *self.names}),
+            "elements": self._elements(),
             "loads": self._loads(),
             "dof_names": tuple(self.names),
         }
@@ -163,36 +171,23 @@ class _Equations:
     def _terms(self, expression: Any) -> Iterable[Any]:
         """Additive terms, as they are written but where that hides linear ones."""
         for term in sympy.Add.make_args(expression):
-            if self._affine(term) or expanded_size(term) > _MOST_TERMS:
-                yield term
-                continue
-            parts = sympy.Add.make_args(sympy.expand(term))
-            if any(self._affine(part) for part in parts):
-                yield from parts
-            else:
-                yield term
+            short = not self._affine(term) and expanded_size(term) <= _MOST_TERMS
+            parts = sympy.Add.make_args(sympy.expand(term)) if short else ()
+            yield from parts if any(map(self._affine, parts)) else (term,)
 
     def _affine(self, term: Any) -> bool:
         """Whether a term is linear in the state, or without it."""
-        inside = term.free_symbols.intersection(self.states)
-        if not inside:
-            return True
-        if any(atom.free_symbols & self.states for atom in term.atoms(*CORNER_FUNCTIONS)):
-            return False
-        return not any(term.diff(s).free_symbols.intersection(self.states) for s in inside)
+        inside = term.free_symbols & self.states
+        return not self._corners(term) and not any(term.diff(s).free_symbols & self.states for s in inside)
 
     def _sort(self, i: int, term: Any) -> None:
         inside = sorted(term.free_symbols.intersection(self.states), key=str)
-        if not inside:
-            self._load(i, term)
-            return
         if not self._affine(term):
-            straight = self._without_modulus(term)
-            for part in (term,) if straight is None else straight:
+            for part in self._without_modulus(term):
                 if self._affine(part):
                     self._sort(i, part)
                 else:
-                    self.forces.add(i, part)
+                    self._add(i, part)
             return
         varying = 0
         for state in inside:
@@ -208,21 +203,18 @@ class _Equations:
                 else:
                     self.damping[i][self.v.index(state)] += part
         if varying != 0:
-            self.forces.add(i, varying)
+            self._add(i, varying)
         rest = term.xreplace(dict.fromkeys(inside, 0 * self.t))
         if rest != 0:
             self._load(i, rest)
 
-    def _without_modulus(self, term: Any) -> tuple[Any, Any] | None:
+    def _without_modulus(self, term: Any) -> tuple[Any, ...]:
         """`k |a|` as `2 k max(a, 0) - k a` where `a` is linear in the displacements: a stop and a spring."""
-        atoms = [atom for atom in term.atoms(Modulus) if atom.free_symbols & self.states]
-        if len(atoms) != 1:
-            return None
-        argument = atoms[0].args[0]
-        factor = term / atoms[0]
-        if factor.free_symbols & {*self.states, self.t} or argument.free_symbols & {*self.v, self.t}:
-            return None
-        return (2 * factor * Ramp(argument), -factor * argument) if self._affine(argument) else None
+        for atom in term.atoms(Modulus):
+            argument, factor = atom.args[0], term / atom
+            if not (factor.free_symbols & {*self.states, self.t} or argument.free_symbols & {*self.v, self.t}):
+                return (2 * factor * Ramp(argument), -factor * argument) if self._affine(argument) else (term,)
+        return (term,)
 
     # -------------------------------------------------------------------------------------------------------- loads
     def _load(self, i: int, term: Any, reduced: bool = False) -> None:
@@ -270,33 +262,8 @@ class _Equations:
             loads.append(HarmonicLoad(i, amplitudes, harmonics, phases, as_text(static) if static != 0 else 0.0))
         return loads
 
-
-def _matrix(entries: list[list[Any]]) -> Any:
-    """Entries as numbers and texts; a matrix of one entry as that."""
-    read = [
-        [as_text(entry) if getattr(entry, "free_symbols", ()) else float(entry) for entry in row] for row in entries
-    ]
-    return read[0][0] if len(read) == 1 else read
-
-
-# ------------------------------------------------------------------------------------------------------------ forces
-class _Forces:
-    """Collects the terms of all equations that are no part of the linear structure, with their places in each.
-
-    A term that depends on a single combination `u = d . x` (and its rate) is a law of u along that direction d. In one
-    that depends on several displacements u stands for the combination that its corners depend on, if that is one.
-    """
-
-    def __init__(self, names: list[str], parameters: Mapping[str, float]) -> None:
-        self.names, self.parameters = names, parameters
-        self.n = len(names)
-        self.x = [symbol(name) for name in names]
-        self.v = [symbol(name + PRIME) for name in names]
-        self.u, self.rate = symbol("(input)"), symbol("(input)" + PRIME)
-        #: whether other states occur, direction of u (None without), law: the factor in every equation
-        self.laws: dict[tuple[bool, tuple[float, ...] | None, Any], np.ndarray] = {}
-
-    def add(self, i: int, term: Any) -> None:
+    # ------------------------------------------------------------------------------------------------------- forces
+    def _add(self, i: int, term: Any) -> None:
         """A term of the left-hand side of equation i."""
         direction = self._direction(term)
         several = direction is None
@@ -314,7 +281,7 @@ class _Forces:
 
     def _corners(self, law: Any) -> list[Any]:
         """Functions with a corner of the state."""
-        states = {self.u, self.rate, *self.x, *self.v}
+        states = {self.u, self.rate, *self.states}
         return [atom for atom in law.atoms(*CORNER_FUNCTIONS) if atom.free_symbols & states]
 
     def _direction(self, term: Any) -> tuple[float, ...] | None:
@@ -337,8 +304,8 @@ class _Forces:
         return tuple(direction) if all(direction[j] for j in inside) else None
 
     # ----------------------------------------------------------------------------------------------------- elements
-    def elements(self, taken: set[str]) -> list[BaseElement]:
-        """Everything that was collected; `taken` are names that are in use."""
+    def _elements(self) -> list[BaseElement]:
+        """Everything that was collected."""
         made: list[BaseElement] = []
         for among_several in (False, True):
             smooth: dict[tuple[Any, tuple[float, ...]], Any] = {}
@@ -351,24 +318,26 @@ class _Forces:
                     acting = direction
                 law = law * number(scale)
                 if self._corners(law):
-                    made.append(self._element(law, direction, acting, taken))
+                    made.append(self._element(law, direction, acting))
                 else:
                     smooth[direction, acting] = smooth.get((direction, acting), 0) + law
-            made += [self._element(law, *where, taken) for where, law in smooth.items() if law != 0]
+            made += [self._element(law, *where) for where, law in smooth.items() if law != 0]
         return made
 
-    def _element(
-        self, law: Any, direction: tuple[float, ...] | None, acting: tuple[float, ...], taken: set[str]
-    ) -> BaseElement:
+    def _element(self, law: Any, direction: tuple[float, ...] | None, acting: tuple[float, ...]) -> BaseElement:
         """As if made by hand, where the law is one of u alone that acts along the same direction; else a text."""
-        if direction == acting and not law.free_symbols & {*self.x, *self.v, self.rate, symbol("t"), symbol("omega")}:
+        if direction == acting and not law.free_symbols & {*self.states, self.rate, self.t, self.omega}:
             made = self._stop(law, acting) or self._spring(law, acting)
             if made is not None:
                 return made
         inputs: dict[str, Any] = {}
         if direction is not None:
             own = self._place(direction)
-            name = self.names[own["dof"]] if isinstance(own.get("dof"), int) else _fresh("u", taken)
+            name, dof = "u", own.get("dof")
+            while name in self.names or name in self.parameters:
+                name += "_"
+            if isinstance(dof, int):
+                name = self.names[dof]
             inputs[name] = next(iter(own.values()))
             law = law.xreplace({self.u: symbol(name), self.rate: symbol(name + PRIME)})
         inputs |= {self.names[j]: j for j in range(self.n) if law.free_symbols & {self.x[j], self.v[j]}}
@@ -416,7 +385,9 @@ class _Forces:
         return {"direction": list(direction)}
 
 
-def _fresh(name: str, taken: set[str]) -> str:
-    while name in taken:
-        name += "_"
-    return name
+def _matrix(entries: list[list[Any]]) -> Any:
+    """Entries as numbers and texts; a matrix of one entry as that."""
+    read = [
+        [as_text(entry) if getattr(entry, "free_symbols", ()) else float(entry) for entry in row] for row in entries
+    ]
+    return read[0][0] if len(read) == 1 else read

@@ -155,14 +155,10 @@ class WrittenForm(BatchForm):
     """A force given as text, from its SymPy expression."""
 
     def __init__(self, law: Any) -> None:
-        from suboctave.model.expressions.derivatives import CORNER_FUNCTIONS
-
         self.law = law
         self.count = len(law.c)
         self.moving = law.depends_on_velocity
-        states = {*law.q, law.phase}
-        atoms = law.expression.atoms(*CORNER_FUNCTIONS)
-        self.places = sorted({atom.args[0] for atom in atoms if atom.free_symbols & states}, key=str)
+        self.places = law.corners()
         self.corners = len(self.places)
 
     def _code(self, parts: list[Any], names: Names, flags: dict[str, str] | None = None) -> tuple[list[str], list[str]]:

@@ -50,16 +50,15 @@ class Coefficient:
         if name not in self.names:
             return ZERO
         if name not in self._derivatives:
-            self._derivatives[name] = self._differentiate(name)
+            if self._form.affine is not None:
+                slope = coefficient(self._form.affine[name])
+            else:
+                from suboctave.model.expressions.derivatives import derivative_form
+
+                form = derivative_form(self._form, name)
+                slope = Coefficient(self.text, form, (*self.by, name)) if form.names else coefficient(form.evaluate({}))
+            self._derivatives[name] = slope
         return self._derivatives[name]
-
-    def _differentiate(self, name: str) -> Coefficient:
-        if self._form.affine is not None:
-            return coefficient(self._form.affine[name])
-        from suboctave.model.expressions.derivatives import derivative_form
-
-        form = derivative_form(self._form, name)
-        return Coefficient(self.text, form, (*self.by, name)) if form.names else coefficient(form.evaluate({}))
 
     def __str__(self) -> str:
         if self.by:
@@ -100,9 +99,9 @@ def coefficient(source: Any) -> Coefficient:
         refused = {"t": "time cannot occur in a coefficient; periodic forces are loads"}
         return Coefficient(source, read(source, "", FUNCTIONS, refused.get))
     if isinstance(source, bool) or not isinstance(source, numbers.Real):
+        kind = type(source).__name__
         raise InputError(
-            f"a coefficient is a number or an expression in the parameters as text, not {source!r} "
-            f"({type(source).__name__})"
+            f"a coefficient is a number or an expression in the parameters as text, not {source!r} ({kind})"
         )
     if not is_number(source):
         raise InputError(f"a coefficient must be finite, not {shortened(source)}")

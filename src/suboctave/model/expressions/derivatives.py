@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import functools
 import math
+import operator
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
@@ -112,43 +113,29 @@ def expression_of(form: Form) -> Any:
     return _converted(form).replace(sympy.Abs, Modulus)
 
 
+#: operations and functions that SymPy has under another name, or that are ours
+_EXPRESSIONS: dict[str, Callable[..., Any]] = {
+    "negative": operator.neg, "+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv,
+    "max": lambda a, b: b + Ramp(a - b), "min": lambda a, b: b - Ramp(b - a),
+    "abs": Modulus, "sign": Sign, "heaviside": Step,
+}  # fmt: skip
+
+
 def _converted(form: Form) -> Any:
-    if form.operation == "name":
-        return symbol(form.parts[0])
-    if form.operation == "pi":
-        return sympy.pi
-    if form.operation == "expression":
-        return form.parts[0]
-    if form.constant is not None and form.operation not in ("negative", "+", "-", "*", "/"):
-        return number(form.constant)
-    match form.operation, [_converted(part) for part in form.parts]:
-        case "negative", [a]:
-            return -a
-        case "+", [a, b]:
-            return a + b
-        case "-", [a, b]:
-            return a - b
-        case "*", [a, b]:
-            return a * b
-        case "/", [a, b]:
-            return a / b
-        case "**", [a, b]:
-            exponent = form.parts[1].constant
-            half = exponent is not None and (2.0 * exponent).is_integer()
-            return a ** (sympy.Rational(int(2.0 * exponent), 2) if half else b)
-        case "max", [a, b]:
-            return b + Ramp(a - b)
-        case "min", [a, b]:
-            return b - Ramp(b - a)
-        case "abs", [a]:
-            return Modulus(a)
-        case "sign", [a]:
-            return Sign(a)
-        case "heaviside", [a]:
-            return Step(a)
-        case name, [a]:
-            return getattr(sympy, name)(a)
-    raise AssertionError(f"{form.operation} was read but has no expression")
+    match form.operation, form.parts:
+        case "name", (name,):
+            return symbol(name)
+        case "pi", _:
+            return sympy.pi
+        case "expression", (expression,):
+            return expression
+        case name, _ if form.constant is not None and name not in ("negative", "+", "-", "*", "/"):
+            return number(form.constant)
+        case "**", (base, exponent):
+            twice = math.nan if exponent.constant is None else 2.0 * exponent.constant
+            return _converted(base) ** (sympy.Rational(int(twice), 2) if twice.is_integer() else _converted(exponent))
+        case name, parts:
+            return (_EXPRESSIONS.get(name) or getattr(sympy, name))(*map(_converted, parts))
 
 
 def number(value: float) -> Any:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 import itertools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -102,25 +102,23 @@ class Law:
     # ------------------------------------------------------------------------------------------------ smoothness
     def _smoothness(self) -> tuple[int | None, list[tuple[int, Any]] | None]:
         """Degree of a polynomial (else None); rows of q and places of corners, None if they cannot be told."""
-
-        f = self.expression
-        states = {*self.q, self.phase}
-        atoms = [atom for atom in f.atoms(*CORNER_FUNCTIONS) if atom.free_symbols & states]
-        if not atoms:
+        arguments = self.corners()
+        if not arguments:
             return self._polynomial(), []
-        places: list[tuple[int, Any]] | None = []
-        for argument in sorted({atom.args[0] for atom in atoms}, key=str):
-            place = self._place(argument)
+        places = [self._place(argument) for argument in arguments]
+        for argument, place in zip(arguments, places, strict=True):
             self._check_continuous(argument, place)
-            if place is None or places is None:
-                places = None
-            else:
-                places.append(place)
-        inputs = {row % self.count for row, _ in places or ()}
-        if places is None or len(inputs) > 1:
+        known = [place for place in places if place is not None]
+        inputs = {row % self.count for row, _ in known}
+        if len(known) < len(places) or len(inputs) > 1:
             return None, None
         self.corner_input = inputs.pop()
-        return None, places if self.corner_input == 0 else None
+        return None, known if self.corner_input == 0 else None
+
+    def corners(self) -> list[Any]:
+        """What vanishes where the force has corners, or jumps, that depend on the state."""
+        arguments = {atom.args[0] for atom in self.expression.atoms(*CORNER_FUNCTIONS)}
+        return sorted((one for one in arguments if one.free_symbols & {*self.q, self.phase}), key=str)
 
     def _place(self, argument: Any) -> tuple[int, Any] | None:
         """Row of q and its value at which an argument vanishes, if it depends on that one alone, and linearly."""
@@ -179,21 +177,20 @@ class Law:
             return PolynomialSampling(max(1, self._degree))
         if not self._corner_places:
             return AdaptiveSampling()
-        values = self._code("corners", [place for _, place in self._corner_places])(
-            np.zeros((len(self.q), 1)), np.zeros(1), c
-        )[:, 0]
-        rows = [row for row, _ in self._corner_places]
-        points = sorted({float(v) for row, v in zip(rows, values, strict=True) if row == 0})
-        velocities = sorted({float(v) for row, v in zip(rows, values, strict=True) if row})
-        return CornerSampling(tuple(points), tuple(velocities), self.rough)
+        rows, places = zip(*self._corner_places, strict=True)
+        values = self._code("corners", lambda: places)(np.zeros((len(self.q), 1)), np.zeros(1), c)[:, 0].tolist()
+        at = [
+            sorted({v for row, v in zip(rows, values, strict=True) if (row > 0) is moving}) for moving in (False, True)
+        ]
+        return CornerSampling(tuple(at[0]), tuple(at[1]), self.rough)
 
     # ------------------------------------------------------------------------------------------------ derivatives
-    def _code(self, what: str, parts: list[Any] | Callable[[], list[Any]]) -> Callable[..., Array]:
+    def _code(self, what: str, parts: Callable[[], Sequence[Any]]) -> Callable[..., Array]:
         if what not in self._compiled:
-            self._compiled[what] = self._compile(parts() if callable(parts) else parts)
+            self._compiled[what] = self._compile(parts())
         return self._compiled[what]
 
-    def _compile(self, parts: list[Any]) -> Callable[..., Array]:
+    def _compile(self, parts: Sequence[Any]) -> Callable[..., Array]:
         """A function `(q, theta, c) -> (len(parts), N)`."""
         return array_function([_off_corners(part) for part in parts], self.q, self.phase, self.c)
 

@@ -138,7 +138,9 @@ class _Reader:
             case ast.Name(id=name):
                 return self.name(node, name)
             case ast.UnaryOp(op=ast.USub(), operand=inner):
-                return self.negative(node, self.read(inner, depth + 1))
+                part = self.read(inner, depth + 1)
+                affine = _scaled(part.affine, -1.0)
+                return self.applied(node, "negative", operator.neg, (part,), affine, part.power, part.size + 1.0)
             case ast.UnaryOp(op=ast.UAdd(), operand=inner):
                 return self.read(inner, depth + 1)
             case ast.BinOp(left=left, op=operation, right=right):
@@ -175,10 +177,6 @@ class _Reader:
         if reason is not None:
             raise self.refuse(node, reason)
         return Form("name", (name,), lambda values: values[name], frozenset([name]), {name: 1.0}, 1.0)
-
-    def negative(self, node: ast.AST, inner: Form) -> Form:
-        affine = _scaled(inner.affine, -1.0)
-        return self.applied(node, "negative", operator.neg, (inner,), affine, inner.power, inner.size + 1.0)
 
     def call(self, node: ast.AST, name: str, arguments: list[Form]) -> Form:
         size = 1.0 + sum(argument.size for argument in arguments)
@@ -232,17 +230,13 @@ def _affine(sign: str, left: Form, right: Form) -> dict[str, float] | None:
     if sign in "+-":
         factor = 1.0 if sign == "+" else -1.0
         factors = {name: p.get(name, 0.0) + factor * q.get(name, 0.0) for name in {*p, *q}}
-    elif sign == "*":
-        if left.constant is not None:
-            factors = _scaled(q, left.constant)
-        elif right.constant is not None:
-            factors = _scaled(p, right.constant)
+    elif sign == "*" and left.constant is not None:
+        factors = _scaled(q, left.constant)
+    elif sign == "*" and right.constant is not None:
+        factors = _scaled(p, right.constant)
     elif sign == "/" and right.constant:
-        divisor = right.constant
-        factors = {name: factor / divisor for name, factor in p.items()}
-    if factors is None or not all(map(math.isfinite, factors.values())):
-        return None
-    return factors
+        factors = {name: factor / right.constant for name, factor in p.items()}
+    return factors if factors is not None and all(map(math.isfinite, factors.values())) else None
 
 
 def _scaled(factors: Mapping[str, float] | None, by: float) -> dict[str, float] | None:
