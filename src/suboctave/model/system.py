@@ -180,21 +180,18 @@ class System:
         used: set[str] = set()
         for where, source, key in self.expressions():
             used |= source.names
-            for name in sorted(source.names):
+            for name in sorted(source.names - {"omega"} if key[0] == "loads" else source.names):
                 with refusals.at(*key):
-                    self._check_name(name, where, source, key[0] == "loads")
+                    if name == "omega":
+                        raise InputError(f"{where}: 'omega' occurs in {source}; only loads may depend on the frequency")
+                    if name not in self.parameters:
+                        known = suggest(name, self.parameters) or "; no parameters are given"
+                        raise InputError(f"{where}: unknown parameter {name!r} in the expression {source}{known}")
         if not refusals.mistakes:
             for name in self.parameters:
                 with refusals.at("parameters", name):
                     if name not in used:
                         raise InputError(f"parameter {name!r} not used in any expression; remove or use it")
-
-    def _check_name(self, name: str, where: str, source: Coefficient, in_load: bool) -> None:
-        if name == "omega" and not in_load:
-            raise InputError(f"{where}: 'omega' occurs in {source}; only loads may depend on the frequency")
-        if name != "omega" and name not in self.parameters:
-            known = suggest(name, self.parameters) or "; no parameters are given"
-            raise InputError(f"{where}: unknown parameter {name!r} in the expression {source}{known}")
 
     def _check_values(self, changed: Mapping[str, float]) -> None:
         """Refuse values at which an expression has no number or the mass is not a mass."""
@@ -207,21 +204,19 @@ class System:
         first = changed is self.parameters
         for i, element in enumerate(self.elements):
             with located("elements", i):
-                self._check_law(element, first)
+                element.check(self.parameters, first)
+                kind = element.sampling(element.coefficient_values(self.parameters))
+                if isinstance(kind, CornerSampling | SharpVelocitySampling) and not element.own_nodes:
+                    what = f"a law with {type(kind).__name__} needs own_nodes = True in its class"
+                    raise InputError(f"{element.label}: {what}")
+                if isinstance(kind, PiecewiseLinear) and element.own_nodes:
+                    raise InputError(f"{element.label}: a piecewise-linear law needs no nodes, own_nodes must be False")
         if first or self.mass.names.intersection(changed):
             mass = self.mass.compact(self.parameters)
             with located("mass"):
                 check_mass(mass)
         if first:
             check_damping(self.damping.compact(self.parameters), mass.diagonal())
-
-    def _check_law(self, element: BaseElement, first: bool) -> None:
-        element.check(self.parameters, first)
-        kind = element.sampling(element.coefficient_values(self.parameters))
-        if isinstance(kind, CornerSampling | SharpVelocitySampling) and not element.own_nodes:
-            raise InputError(f"{element.label}: a law with {type(kind).__name__} needs own_nodes = True in its class")
-        if isinstance(kind, PiecewiseLinear) and element.own_nodes:
-            raise InputError(f"{element.label}: a piecewise-linear law needs no nodes, own_nodes must be False")
 
     # --------------------------------------------------------------------------------------------------- matrices
     def matrices(self, values: Mapping[str, float] | None = None) -> tuple[Array, Array, Array]:

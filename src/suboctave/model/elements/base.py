@@ -45,29 +45,22 @@ class Place:
             raise InputError(f"{owner} needs either dof= (one index, or a pair) or direction= (a vector), not both")
         self.dofs: tuple[int, ...] = ()
         self.vector: Array | None = None
-        with located("direction" if dof is None else "dof"):
-            if dof is None:
-                self.vector = self._read_vector(direction)
-            else:
-                self.dofs = self._read_dofs(dof)
-
-    def _read_dofs(self, dof: Dof) -> tuple[int, ...]:
-        entries = tuple(dof) if isinstance(dof, Sequence | np.ndarray) else (dof,)
-        if len(entries) not in (1, 2) or any(isinstance(e, bool) or not isinstance(e, Integral) for e in entries):
-            raise InputError(f"{self.owner}: dof must be an integer or a pair of integers, not {dof!r}")
-        dofs = tuple(int(entry) for entry in entries)
-        if min(dofs) < 0:
-            raise InputError(f"{self.owner}: dof {min(dofs)} is negative; degrees of freedom count from 0")
-        if len(set(dofs)) < len(dofs):
-            raise InputError(f"{self.owner}: dof={dofs} couples a degree of freedom with itself")
-        return dofs
-
-    def _read_vector(self, direction: Any) -> Array:
-        vector = numbers_of(direction)
-        if vector.ndim != 1 or not np.all(np.isfinite(vector)) or not np.any(vector):
-            raise InputError(f"{self.owner}: direction must be a vector of finite numbers, not all zero")
-        vector.setflags(write=False)
-        return vector
+        if dof is None:
+            self.vector = numbers_of(direction)
+            if self.vector.ndim != 1 or not np.all(np.isfinite(self.vector)) or not np.any(self.vector):
+                text = f"{owner}: direction must be a vector of finite numbers, not all zero"
+                raise InputError(text, ("direction",))
+            self.vector.setflags(write=False)
+            return
+        given = tuple(dof) if isinstance(dof, Sequence | np.ndarray) else (dof,)
+        with located("dof"):
+            if len(given) not in (1, 2) or any(isinstance(e, bool) or not isinstance(e, Integral) for e in given):
+                raise InputError(f"{owner}: dof must be an integer or a pair of integers, not {dof!r}")
+            self.dofs = tuple(int(entry) for entry in given)
+            if min(self.dofs) < 0:
+                raise InputError(f"{owner}: dof {min(self.dofs)} is negative; degrees of freedom count from 0")
+            if len(set(self.dofs)) < len(self.dofs):
+                raise InputError(f"{owner}: dof={self.dofs} couples a degree of freedom with itself")
 
     def direction(self, n: int) -> Array:
         """The direction (n,) in a structure of n degrees of freedom; an `InputError` if it does not fit."""

@@ -168,31 +168,26 @@ class WrittenForm(BatchForm):
     def tangent(self, names: Names) -> Tangent:
         return self._tangent(self.law.expression, names, {}, True)
 
-    def frozen(self, names: Names, slopes: bool = True) -> Tangent:
-        expression, flags = self._frozen(names)
-        return self._tangent(expression, names, flags, slopes)
-
     def _tangent(self, f: Any, names: Names, flags: dict[str, str], slopes: bool) -> Tangent:
         lines, (force, *by) = self._code([f, *(f.diff(a) for a in self.law.q if slopes)], names, flags)
         by += [""] * (2 * self.law.count - len(by))
         return Tangent(lines, force, by[: self.law.count], by[self.law.count :])
 
-    def _frozen(self, names: Names) -> tuple[Any, dict[str, str]]:
-        """The expression with flags for what lies beyond its corners, and the code of the flags."""
+    def frozen(self, names: Names, slopes: bool = True) -> Tangent:
+        """See `BatchForm.frozen`: flags are symbols in the expression."""
         import sympy
 
         from suboctave.model.expressions.derivatives import Modulus, Ramp, Sign, Step
 
-        if self.law.rough:  # a power of a half that begins at a corner does not go on beyond it
-            return self.law.expression, {}
         swaps: dict[Any, Any] = {}
         flags: dict[str, str] = {}
-        for i, a in enumerate(self.places):
+        # a power of a half that begins at a corner does not go on beyond it
+        for i, a in enumerate(() if self.law.rough else self.places):
             on = sympy.Symbol(f"(on {i})")
             flags[on.name] = names.on(i)
             swaps |= {Ramp(a): a * on, Step(a): on}
             swaps |= {Modulus(a): a * (2 * on - 1), Sign(a): 2 * on - 1}
-        return self.law.expression.xreplace(swaps), flags
+        return self._tangent(self.law.expression.xreplace(swaps), names, flags, slopes)
 
     def corner(self, i: int, names: Names) -> tuple[list[str], str, str]:
         place = self.places[i]
