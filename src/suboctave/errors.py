@@ -65,13 +65,15 @@ class Refusals:
 
 
 @contextmanager
-def located(*key: str | int) -> Iterator[None]:
-    """An InputError of the block is about the part `key` of the input."""
+def located(*key: str | int, owner: str = "") -> Iterator[None]:
+    """An InputError of the block is about the part `key` of the input, and begins with its owner, if that is named."""
     try:
         yield
     except InputError as error:
         for part in error.parts:
             part.key = (*key, *part.key)
+        if owner:
+            error.args = (f"{owner}: {error}",)
         raise
 
 

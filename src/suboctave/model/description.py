@@ -120,10 +120,8 @@ def describe_part(part: Any, arrays: Arrays | None = None) -> dict[str, Any]:
         raise InputError(f"{part!r} cannot be written down: it does not know the arguments it was made with")
     if "<" in kind.__qualname__:
         raise InputError(f"{kind.__qualname__} cannot be written down: define it at the top of a module")
-    try:
+    with located(owner=repr(part)):
         return {"type": type_name(kind)} | {name: plain_value(value, arrays) for name, value in given.items()}
-    except InputError as error:
-        raise InputError(f"{part!r}: {error}") from None
 
 
 def build_part(

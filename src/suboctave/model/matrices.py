@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from suboctave.errors import InputError, NegativeDampingWarning
+from suboctave.errors import InputError, NegativeDampingWarning, located
 from suboctave.model.elements.base import Array
 from suboctave.model.expressions.coefficients import Coefficient, coefficient
 
@@ -130,7 +130,14 @@ def _constant(source: Any, what: str) -> Any:
 
 
 def _from_entries(source: Any, n: int | None, what: str) -> MatrixCoefficient:
-    array = _object_array(source, what)
+    numbers = isinstance(source, np.ndarray) and source.dtype.kind not in "OU"
+    if numbers and source.dtype.kind not in "fiu":
+        raise InputError(f"{what} must hold numbers or expressions, not {source.dtype}")
+    if isinstance(source, Sequence) and not isinstance(source, str):
+        lengths = {len(row) for row in source if isinstance(row, Sequence | np.ndarray) and not isinstance(row, str)}
+        if len(lengths) > 1:
+            raise InputError(f"{what} has rows of different lengths: {sorted(lengths)}")
+    array = source if numbers else np.array(source, dtype=object)
     if array.ndim == 0 and (n or 1) > 1:
         if array.item() != 0:
             raise InputError(
@@ -145,10 +152,8 @@ def _from_entries(source: Any, n: int | None, what: str) -> MatrixCoefficient:
     base = np.zeros(array.shape)
     patterns: dict[Coefficient, Array] = {}
     for (i, j), entry in np.ndenumerate(array):
-        try:
+        with located(owner=f"{what}[{i}, {j}]"):
             read = coefficient(entry)
-        except InputError as error:
-            raise InputError(f"{what}[{i}, {j}]: {error}") from None
         if read.constant:
             base[i, j] = read.value({})
         else:
@@ -156,28 +161,13 @@ def _from_entries(source: Any, n: int | None, what: str) -> MatrixCoefficient:
     return MatrixCoefficient(_constant(base, what), list(patterns.items()), what)
 
 
-def _object_array(source: Any, what: str) -> Any:
-    """Entries that may be numbers and expressions; an array of numbers as it is."""
-    if isinstance(source, np.ndarray):
-        if source.dtype.kind not in "OUfiu":
-            raise InputError(f"{what} must hold numbers or expressions, not {source.dtype}")
-        return source.astype(object) if source.dtype.kind in "OU" else source
-    if isinstance(source, Sequence) and not isinstance(source, str):
-        lengths = {len(row) for row in source if isinstance(row, Sequence | np.ndarray) and not isinstance(row, str)}
-        if len(lengths) > 1:
-            raise InputError(f"{what} has rows of different lengths: {sorted(lengths)}")
-    return np.array(source, dtype=object)
-
-
 def _from_terms(source: Mapping[Any, Any], what: str) -> MatrixCoefficient:
     if not source:
         raise InputError(f"{what} is an empty mapping; give {{expression: matrix}}")
     read = []
     for expression, matrix in source.items():
-        try:
+        with located(owner=what):
             factor = coefficient(expression)
-        except InputError as error:
-            raise InputError(f"{what}: {error}") from None
         read.append((factor, _constant(matrix, f"{what}[{expression!r}]")))
     shapes = {matrix.shape for _, matrix in read}
     if len(shapes) > 1:

@@ -197,10 +197,8 @@ class System:
         """Refuse values at which an expression has no number or the mass is not a mass."""
         for where, source, key in self.expressions():
             if source.names and "omega" not in source.names:
-                try:
+                with located(*key, owner=where):
                     source.value(self.parameters)
-                except InputError as error:
-                    raise InputError(f"{where}: {error}", key) from None
         first = changed is self.parameters
         for i, element in enumerate(self.elements):
             with located("elements", i):

@@ -82,7 +82,7 @@ def _input_place(owner: str, given: Any) -> Place:
     is_vector = isinstance(given, np.ndarray) or (
         isinstance(given, Sequence) and any(not isinstance(entry, int | np.integer) for entry in given)
     )
-    return Place(f"{owner}, inputs", None, given) if is_vector else Place(f"{owner}, inputs", given, None)
+    return Place(f"{owner}, inputs", *((None, given) if is_vector else (given, None)))
 
 
 class _OneInput:

@@ -10,7 +10,7 @@ import numbers
 from collections.abc import Iterable, Mapping
 from typing import Any, TypeAlias
 
-from suboctave.errors import InputError, is_number, shortened, suggest
+from suboctave.errors import InputError, is_number, located, shortened, suggest
 from suboctave.model.expressions.reader import FUNCTIONS, Form, number_form, read
 
 
@@ -110,10 +110,8 @@ def coefficient(source: Any) -> Coefficient:
 
 def named_coefficient(source: Any, owner: str, name: str) -> Coefficient:
     """The coefficient of this name; refusals begin with its owner, and point at it."""
-    try:
+    with located(name, owner=f"{owner}, {name}"):
         return coefficient(source)
-    except InputError as error:
-        raise InputError(f"{owner}, {name}: {error}", (name,)) from None
 
 
 ZERO = coefficient(0.0)

@@ -125,25 +125,23 @@ class Law:
         rows = [r for r, state in enumerate(self.q) if state in argument.free_symbols]
         if len(rows) != 1 or self.phase in argument.free_symbols:
             return None
-        slope = argument.diff(self.q[rows[0]])
-        if slope.free_symbols.intersection(self.q):
-            return None
-        return rows[0], -argument.subs(self.q[rows[0]], 0) / slope
+        state = self.q[rows[0]]
+        slope = argument.diff(state)
+        return None if slope.free_symbols.intersection(self.q) else (rows[0], -argument.subs(state, 0) / slope)
 
     def _check_continuous(self, argument: Any, place: tuple[int, Any] | None) -> None:
         """Refuse a force that jumps where an argument of a corner function vanishes."""
+        if not self.expression.has(Step(argument), Sign(argument)):
+            return
         above = {Ramp: argument, Step: 1, Modulus: argument, Sign: 1}
         below = {Ramp: 0, Step: 0, Modulus: -argument, Sign: -1}
-        jumps = any(isinstance(a, (Step, Sign)) and a.args[0] == argument for a in _functions(self.expression))
-        if not jumps:
-            return
         hint = (
             "a force must be continuous. Multiply by something that vanishes there, or smooth it: dry friction is "
             "TanhFriction, or tanh(v/v0)"
         )
+        jump = f"the force jumps where {as_text(argument)} changes sign; {hint}"
         if place is None:
-            where = f"where {as_text(argument)} changes sign"
-            raise InputError(f"{self.where}: it cannot be told whether the force jumps {where}; {hint}")
+            raise InputError(f"{self.where}: it cannot be told whether {jump}")
         sides = [self.expression.subs({kind(argument): v for kind, v in one.items()}) for one in (above, below)]
         draw = np.random.default_rng(1)
         q, c = draw.uniform(0.3, 1.7, (len(self.q), 5)), draw.uniform(0.3, 1.7, len(self.c))
@@ -151,7 +149,7 @@ class Law:
         q[place[0]] = self._compile([place[1]])(q, theta, c)[0]
         upper, lower = self._compile(sides)(q, theta, c)
         if not np.all(np.abs(upper - lower) <= 1e-9 * (1.0 + np.abs(upper) + np.abs(lower))):
-            raise InputError(f"{self.where}: the force jumps where {as_text(argument)} changes sign; {hint}")
+            raise InputError(f"{self.where}: {jump}")
 
     def _polynomial(self) -> int | None:
         """Total degree in q of a polynomial whose time enters by sines and cosines, else None."""
@@ -159,11 +157,8 @@ class Law:
         generators = [*self.q, *sympy.symbols(f"wave_:{len(waves)}")]
         harmonics = [0] * len(self.q) + [abs(int(wave.args[0].coeff(self.phase))) for wave in waves]
         swapped = self.expression.xreplace(dict(zip(waves, generators[len(self.q) :], strict=True)))
-        if (
-            self.phase in swapped.free_symbols
-            or not swapped.is_polynomial(*generators)
-            or expanded_size(swapped) > 1000
-        ):
+        plain = self.phase not in swapped.free_symbols and swapped.is_polynomial(*generators)
+        if not plain or expanded_size(swapped) > 1000:
             return None
         monomials = sympy.Poly(swapped, *generators).monoms()
         products = [sum(p * h for p, h in zip(powers, harmonics, strict=True)) for powers in monomials]
@@ -179,10 +174,9 @@ class Law:
             return AdaptiveSampling()
         rows, places = zip(*self._corner_places, strict=True)
         values = self._code("corners", lambda: places)(np.zeros((len(self.q), 1)), np.zeros(1), c)[:, 0].tolist()
-        at = [
-            sorted({v for row, v in zip(rows, values, strict=True) if (row > 0) is moving}) for moving in (False, True)
-        ]
-        return CornerSampling(tuple(at[0]), tuple(at[1]), self.rough)
+        points = {value for row, value in zip(rows, values, strict=True) if row == 0}
+        velocities = {value for row, value in zip(rows, values, strict=True) if row}
+        return CornerSampling(tuple(sorted(points)), tuple(sorted(velocities)), self.rough)
 
     # ------------------------------------------------------------------------------------------------ derivatives
     def _code(self, what: str, parts: Callable[[], Sequence[Any]]) -> Callable[..., Array]:
@@ -262,10 +256,6 @@ def _off_corners(expression: Any) -> Any:
     return expression.xreplace(swaps)
 
 
-def _functions(expression: Any) -> list[Any]:
-    return sorted(expression.atoms(sympy.Function), key=str)
-
-
 def _with_phase(expression: Any, where: str) -> tuple[Any, int]:
     """Time as the phase theta = omega t of the load, and its highest multiple."""
     t, omega, theta = symbol("t"), symbol("omega"), symbol(_THETA)
@@ -274,8 +264,8 @@ def _with_phase(expression: Any, where: str) -> tuple[Any, int]:
             raise InputError(f"{where}: omega occurs outside of cos(k*omega*t); only loads may depend on the frequency")
         return expression, 0
     highest, swaps = 0, {}
-    for wave in _functions(expression):
-        if t not in wave.free_symbols or type(wave).__name__ not in ("sin", "cos"):
+    for wave in sorted(expression.atoms(sympy.sin, sympy.cos), key=str):
+        if t not in wave.free_symbols:
             continue
         multiple = harmonic_of(wave.args[0])
         if multiple is None:
