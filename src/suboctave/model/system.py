@@ -250,9 +250,9 @@ class System:
         at = {**(self.parameters if values is None else values), "omega": float(omega)}
         times = np.asarray(t, dtype=float)
         force = np.zeros((self.n, *times.shape))
-        for component in self._components:
-            wave = np.cos(component.harmonic * omega * times + component.phase.value(at))
-            force += np.multiply.outer(component.direction, component.amplitude.value(at) * wave)
+        for one in self._components:
+            wave = np.cos(one.harmonic * omega * times + one.phase.value(at))
+            force += np.multiply.outer(one.direction, one.amplitude.value(at) * wave)
         return force
 
     @property

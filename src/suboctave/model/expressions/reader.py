@@ -139,8 +139,8 @@ class _Reader:
                 return self.name(node, name)
             case ast.UnaryOp(op=ast.USub(), operand=inner):
                 part = self.read(inner, depth + 1)
-                affine = _scaled(part.affine, -1.0)
-                return self.applied(node, "negative", operator.neg, (part,), affine, part.power, part.size + 1.0)
+                known = {"affine": _scaled(part.affine, -1.0), "power": part.power, "size": part.size + 1.0}
+                return self.applied(node, "negative", operator.neg, (part,), **known)
             case ast.UnaryOp(op=ast.UAdd(), operand=inner):
                 return self.read(inner, depth + 1)
             case ast.BinOp(left=left, op=operation, right=right):
@@ -152,8 +152,8 @@ class _Reader:
                 return self.call(node, name, [self.read(argument, depth + 1) for argument in arguments])
             case ast.Call(func=ast.Name(id=name)) if name not in self.functions:
                 other = _ELSEWHERE.get(name, "")
-                known = other in self.functions or name == "pow"
-                hint = f"; write {other}" if known else suggest(name, self.functions)
+                elsewhere = other in self.functions or name == "pow"
+                hint = f"; write {other}" if elsewhere else suggest(name, self.functions)
                 raise self.refuse(node, f"there is no function {name!r}{hint}")
         what = _WORDS.get(type(node), type(node).__name__)
         raise self.refuse(node, f"{what} is not allowed (numbers, names, + - * / **, parentheses, functions, pi)")
@@ -184,25 +184,18 @@ class _Reader:
             if size > _MOST_OPERATIONS:
                 raise self.refuse(node, f"{name} of arguments this long; split it into terms")
             size += 2.0 + arguments[1].size
-        return self.applied(node, name, self.functions[name], tuple(arguments), None, 1.0, size)
+        return self.applied(node, name, self.functions[name], tuple(arguments), power=1.0, size=size)
 
     def applied(
-        self,
-        node: ast.AST,
-        operation: str,
-        function: Callable[..., float],
-        parts: tuple[Form, ...],
-        affine: dict[str, float] | None,
-        power: float,
-        size: float,
+        self, node: ast.AST, operation: str, function: Callable[..., float], parts: tuple[Form, ...], **known: Any
     ) -> Form:
-        """An operation on one part or two."""
+        """An operation on one part or two, and what is known about its form."""
         f, g = parts[0].evaluate, parts[-1].evaluate
         evaluate: Evaluate = (lambda at: function(f(at), g(at))) if len(parts) == 2 else (lambda at: function(f(at)))
         names = frozenset().union(*(part.names for part in parts))
         if not names:
             return self.known(node, operation, parts, lambda: evaluate({}))
-        return Form(operation, parts, evaluate, names, affine, power, size)
+        return Form(operation, parts, evaluate, names, **known)
 
     def binary(self, node: ast.AST, symbol: ast.operator, left: Form, right: Form) -> Form:
         sign = _SIGNS.get(type(symbol))
@@ -218,8 +211,8 @@ class _Reader:
                 raise self.refuse(node, f"the power is larger than {_LARGEST_POWER}")
         if sign == "/" and b == 0.0 and a is None:
             raise self.refuse(node, "division by zero")
-        affine, size = _affine(sign, left, right), left.size + right.size + 1.0
-        return self.applied(node, sign, _OPERATIONS[sign], (left, right), affine, power, size)
+        known = {"affine": _affine(sign, left, right), "power": power, "size": left.size + right.size + 1.0}
+        return self.applied(node, sign, _OPERATIONS[sign], (left, right), **known)
 
 
 def _affine(sign: str, left: Form, right: Form) -> dict[str, float] | None:
