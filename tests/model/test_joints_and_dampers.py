@@ -10,6 +10,8 @@ from scipy.integrate import quad
 
 import suboctave as so
 from suboctave.errors import InputError
+from suboctave.model import PolynomialSampling
+from suboctave.model.elements.written import WrittenElement
 
 LAWS = [
     so.QuadraticDamper(0, 0.3),
@@ -39,6 +41,24 @@ def test_all_derivatives_to_third_order_agree_with_differences(element):
     own = not isinstance(element, so.Callable)  # whose third derivatives are differences
     assert ("f_uuu" in report.errors) == own
     assert ("f_vvv" in report.errors) == (own and element.depends_on_velocity)
+
+
+class DampedSpring(WrittenElement):
+    """Its coefficients do not stand in the order of the alphabet."""
+
+    coefficient_names = ("stiffness", "drag")
+    text = "stiffness*x**3 + drag*v"
+
+    def sampling(self, c):
+        return PolynomialSampling(3)
+
+
+def test_a_written_law_keeps_the_order_of_its_coefficients():
+    element = DampedSpring(0, [2.0, "d"])
+    assert so.check_derivatives(element, {"d": 0.1}), so.check_derivatives(element, {"d": 0.1})
+    u, v, c = np.array([0.7]), np.array([-0.3]), element.coefficient_values({"d": 0.1})
+    assert element.tangent(u, v, c)[0] == pytest.approx(2.0 * 0.7**3 - 0.1 * 0.3)
+    np.testing.assert_allclose(element.coefficient_tangent(u, v, c)[0], [u**3, v])
 
 
 GIVEN = {

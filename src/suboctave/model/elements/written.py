@@ -39,10 +39,14 @@ class WrittenElement(Element):
     dissipative: tuple[str, ...] = ()
 
     def check(self, values: Mapping[str, float], first: bool) -> None:
-        """Say when a system is made that it is driven instead of damped."""
+        """Refuse what is no law; say when a system is made that it is driven instead of damped."""
+        self._refuse(values)
         named = zip(self.coefficient_names, self.coefficients, strict=True)
         if first and any(name in self.dissipative and c.value(values) < 0.0 for name, c in named):
             warn_of_negative(f"{self.label} feeds energy into motions")
+
+    def _refuse(self, values: Mapping[str, float]) -> None:
+        """Refuse coefficients at which there is no law."""
 
     @property
     @abstractmethod
@@ -123,14 +127,10 @@ class TanhFriction(WrittenElement):
     ) -> None:
         super().__init__(dof, [force, velocity], direction=direction)
         if self.coefficients[1].constant:
-            self._check_velocity(self.coefficients[1].value({}))
+            self._refuse({})
 
-    def check(self, values: Mapping[str, float], first: bool) -> None:
-        """Refuse a velocity that is not positive."""
-        super().check(values, first)
-        self._check_velocity(self.coefficients[1].value(values))
-
-    def _check_velocity(self, v: float) -> None:
+    def _refuse(self, values: Mapping[str, float]) -> None:
+        v = self.coefficients[1].value(values)
         if v <= 0.0:
             raise InputError(f"{self.label}: velocity must be positive (smaller is closer to dry friction), not {v:g}")
         if v < _SLOWEST:
