@@ -1,8 +1,7 @@
 """Is it true: motions, branches and bifurcations against shooting in time."""
 
-from suboctave.verification.branch import verify
-from suboctave.verification.motion import Verification, stability
 from suboctave.verification.result import BranchVerification, VerifiedBifurcation, VerifiedPoint
+from suboctave.verification.verify import Verification, stability, verify
 
 __all__ = [
     "BranchVerification",

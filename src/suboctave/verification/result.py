@@ -22,8 +22,8 @@ from suboctave.interruption import Interruption
 from suboctave.results.branch import Branch
 from suboctave.results.files import branch_from_dataset, branch_to_dataset
 from suboctave.store.layout import parameter_column
-from suboctave.store.plain import array_of, flat, from_json, padded, to_json
-from suboctave.store.registry import Codec, parts_of, register
+from suboctave.store.plain import Recorded, flat, padded, recorded
+from suboctave.store.registry import Codec, Datasets, parts_of, register
 from suboctave.version import __version__
 
 if TYPE_CHECKING:
@@ -171,19 +171,17 @@ class BranchVerification(TimeResult):
         import xarray
 
         points, events = self.points, self.bifurcations
+        tables = ("", "point", points, POINT_COLUMNS), ("event_", "event", events, EVENT_COLUMNS)
         variables: dict[str, Any] = {
-            name: ("point", np.array([getattr(p, name) for p in points], dtype=kind))
-            for name, kind in POINT_COLUMNS.items()
+            f"{prefix}{name}": (axis, np.array([getattr(item, name) for item in items], dtype=kind))
+            for prefix, axis, items, columns in tables
+            for name, kind in columns.items()
         }
         for name in VERDICTS:
             verdicts = [getattr(p, name) for p in points]
             variables[name] = ("point", np.array([-1 if v is None else int(v) for v in verdicts], dtype=int))
         variables["multipliers"] = (("point", "multiplier"), padded([p.multipliers for p in points], complex))
         variables["multiplier_errors"] = (("point", "error"), padded([p.errors for p in points], float))
-        variables |= {
-            f"event_{name}": ("event", np.array([getattr(e, name) for e in events], dtype=kind))
-            for name, kind in EVENT_COLUMNS.items()
-        }
         attributes = {
             "contents": "verification",
             "free": self.branch.name,
@@ -238,45 +236,35 @@ class BranchVerification(TimeResult):
 
 
 # ---------------------------------------------------------------------------------------- files: a head, and the branch
-def verification_to_datasets(check: BranchVerification) -> dict[str, xarray.Dataset]:
+def _write(check: BranchVerification) -> dict[str, xarray.Dataset]:
     """The head under the name "", and the branch."""
-    import xarray
-
-    head = check.to_xarray()
     record = {
         "multipliers": [len(p.multipliers) for p in check.points],
         "errors": [len(p.errors) for p in check.points],
         "parameters": [dict(e.parameters) for e in check.bifurcations],
     }
-    variables = {name: (v.dims, v.values, v.attrs) for name, v in head.variables.items()}
-    variables["record"] = ((), np.array(to_json(record)), {"long_name": "numbers of multipliers, parameters, as JSON"})
-    stored = xarray.Dataset(variables, attrs={**head.attrs, "parts": "branch"})
-    return {"": stored, "branch": branch_to_dataset(check.branch)}
+    head = recorded(check.to_xarray(), record, "numbers of multipliers, parameters, as JSON")
+    return {"": head.assign_attrs(parts="branch"), "branch": branch_to_dataset(check.branch)}
 
 
-def verification_from_datasets(
-    groups: Mapping[str, xarray.Dataset], allow_code: bool = False, linear: LinearPart | None = None
-) -> BranchVerification:
-    """The verification that `verification_to_datasets` wrote."""
+def _read(groups: Datasets, allow_code: bool, linear: LinearPart | None) -> BranchVerification:
     branch = branch_from_dataset(parts_of(groups, ["branch"], "verification")["branch"], allow_code, linear)
-    head = groups[""]
-    record = from_json(str(head["record"].item()))
-    columns = {name: array_of(head, name) for name in (*POINT_COLUMNS, *VERDICTS, "multipliers", "multiplier_errors")}
+    stored = Recorded(groups[""], allow_code)
     points = []
-    for i, (count, errors) in enumerate(zip(record["multipliers"], record["errors"], strict=True)):
-        known: dict[str, Any] = {name: kind(columns[name][i]) for name, kind in POINT_COLUMNS.items()}
-        known |= {name: None if columns[name][i] < 0 else bool(columns[name][i]) for name in VERDICTS}
-        points.append(VerifiedPoint(
-            multipliers=columns["multipliers"][i, :count].copy(),
-            errors=columns["multiplier_errors"][i, :errors].copy(), **known,
-        ))  # fmt: skip
-    met = {name: array_of(head, f"event_{name}") for name in EVENT_COLUMNS}
+    for i, (count, errors) in enumerate(zip(stored.record["multipliers"], stored.record["errors"], strict=True)):
+        known: dict[str, Any] = {name: kind(stored[name][i]) for name, kind in POINT_COLUMNS.items()}
+        known |= {name: None if stored[name][i] < 0 else bool(stored[name][i]) for name in VERDICTS}
+        mu, doubt = stored["multipliers"][i, :count].copy(), stored["multiplier_errors"][i, :errors].copy()
+        points.append(VerifiedPoint(multipliers=mu, errors=doubt, **known))
     events = [
-        VerifiedBifurcation(parameters=values, **{name: kind(met[name][i]) for name, kind in EVENT_COLUMNS.items()})
-        for i, values in enumerate(record["parameters"])
+        VerifiedBifurcation(
+            parameters=values, **{n: kind(stored[f"event_{n}"][i]) for n, kind in EVENT_COLUMNS.items()}
+        )
+        for i, values in enumerate(stored.record["parameters"])
     ]
-    tolerance, complete = float(head.attrs["tolerance"]), bool(head.attrs["complete"])
+    attributes = stored.dataset.attrs
+    tolerance, complete = float(attributes["tolerance"]), bool(attributes["complete"])
     return BranchVerification(branch, tuple(points), tuple(events), tolerance, complete)
 
 
-register(Codec("verification", BranchVerification, verification_to_datasets, verification_from_datasets))
+register(Codec("verification", BranchVerification, _write, _read))

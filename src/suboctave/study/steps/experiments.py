@@ -30,8 +30,7 @@ from suboctave.study.steps.base import (
     as_stability,
     tried,
 )
-from suboctave.verification.branch import verify
-from suboctave.verification.motion import stability
+from suboctave.verification.verify import stability, verify
 
 
 class Basins(Step):
