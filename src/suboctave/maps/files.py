@@ -1,24 +1,28 @@
-"""What the files of maps have in common: a head with a record, branches and curves, pieces of curves by number.
+"""Isolas, maps of isolas and regime maps as datasets that a file or the journal can hold, and back.
 
-Isolas as datasets that a file or the journal can hold, and back.
+Of each a head, and branches and curves as `suboctave.store.layout` lays them out, which the head lists. What is neither
+is JSON in the head's `record`: pieces of curves by the number along them, events by their index, motions by those of
+branch and point.
 
-A head as `suboctave.store.layout` lays it out; curves of limit points and of period doublings as `limit_points_0`, ...,
-`doublings_0`, ...; the closed branches that are known as `closed_0`, ..., in the order of the head's dimension
-`closed`. What else there is of the isolas is JSON in `record`: the pieces of curves that their limit points lie on, by
-the curve and the number along it, their ends, by the curve and the index of the event, and the options.
-
-Regime maps as datasets that a file can hold, and back.
-
-The head holds `RegimeMap.to_table()`, one row for each place on a border. The curves of bifurcations are the groups
-`curve_0`, ...; the branches that stable arcs are stretches of `branch_0`, .... The JSON in `record` says the rest: the
-strips, their slices and the arcs of these, each by the branch and the indices of its points, with two edges, of which
-a border is named by its number among those of all curves.
+isolas
+    The head as `store.layout` says; curves of limit points and of period doublings as `limit_points_0`, ...,
+    `doublings_0`, ...; the closed branches that are known as `closed_0`, ..., in the order of the head's dimension
+    `closed`. `record`: the pieces that their limit points lie on, by the curve and the number along it, their ends, by
+    the curve and the index of the event, and the options.
+isola map
+    The head holds `IsolaMap.to_table()`; the curves as `curve_0`, ..., the isolas under `isolas`. `record` says of each
+    region which isola and which curves it rests on, over which stretch of the second parameter, between which two ends:
+    a number, or a border by its number among those of all curves.
+regime map
+    The head holds `RegimeMap.to_table()`; the curves of bifurcations as `curve_0`, ..., the branches that stable arcs
+    are stretches of as `branch_0`, .... `record`: the strips, their slices and the arcs of these, each by the branch
+    and the indices of its points, with two edges, of which a border is named by its number among those of all curves.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -34,321 +38,241 @@ from suboctave.maps.isolas.result import Isola, IsolaEnd, Isolas, head_dataset
 from suboctave.maps.pieces import MonotonePiece, pieces_of
 from suboctave.maps.regimes.map import RegimeMap
 from suboctave.maps.regimes.slices import Arc, Edge, Slice, Strip
-from suboctave.model.system import System, build
-from suboctave.results.branch import Branch, TrackedBranch
+from suboctave.results.branch import Branch
 from suboctave.results.files import branch_from_dataset, branch_to_dataset
 from suboctave.store.layout import parameter_column
-from suboctave.store.plain import flat, from_json, system_arrays, to_json, written_system
-from suboctave.store.registry import Codec, parts_of, register
+from suboctave.store.plain import Recorded, recorded, written_system
+from suboctave.store.registry import Codec, Datasets, parts_of, register
 
 if TYPE_CHECKING:
     import xarray
 
-    from suboctave.harmonic.linear_part import LinearPart
-    from suboctave.store.table import Table
-
-CLASSES: dict[str, type] = {
-    c.__name__: c for c in (NewtonOptions, SteppingOptions, Arbitration, Hill, KoopmanHill, Monodromy, Interruption)
+_CLASSES: dict[str, type] = {
+    c.__name__: c
+    for c in (NewtonOptions, SteppingOptions, Arbitration, Hill, KoopmanHill, Monodromy, Interruption, Probe)
 }
 
 
-def map_datasets(
-    item: Any,
-    variables: Mapping[Any, Any],
-    attributes: Mapping[str, Any],
-    record: Mapping[str, Any],
-    parts: Mapping[str, Branch],
+def _written(
+    item: Any, head: xarray.Dataset, record: Mapping[str, Any], parts: Mapping[str, Branch]
 ) -> dict[str, xarray.Dataset]:
-    """The head under the name "", `record` as JSON and the item's system with it; `parts` under names that it lists."""
-    import xarray
-
+    """The head under the name "", with `record` and the item's system; `parts` under names that it lists."""
     described, arrays = written_system(item.system)
-    text = to_json({**record, "notes": item.notes, "interruption": item.interruption, "system": described})
-    own: dict[str, Any] = {"record": ((), np.array(text), {"long_name": "what else there is, as JSON"})}
-    own |= {name: (tuple(f"{name}_{i}" for i in range(array.ndim)), array) for name, array in arrays.items()}
-    head = xarray.Dataset(dict(flat({**variables, **own})), attrs={**attributes, "parts": "\n".join(parts)})
+    whole = {**record, "notes": item.notes, "interruption": item.interruption, "system": described}
+    stored = recorded(head, whole, "what else there is, as JSON", arrays).assign_attrs(parts="\n".join(parts))
     if item.seconds == item.seconds:
-        head.attrs["seconds"] = float(item.seconds)
-    return {"": head} | {name: branch_to_dataset(part) for name, part in parts.items()}
+        stored.attrs["seconds"] = float(item.seconds)
+    return {"": stored} | {name: branch_to_dataset(part) for name, part in parts.items()}
 
 
-def table_head(item: Any) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Variables and attributes of a head that holds the table of a map."""
-    table: Table = item.to_table()
-    columns = {parameter_column(name, ("record",)): ("row", column) for name, column in table.columns.items()}
-    return columns, {"title": table.title, "system": item.system.name}
+class _Opened(Recorded):
+    """What `_written` laid out: the record, the item's system, the parts by name."""
 
-
-class Opened(NamedTuple):
-    """What `map_datasets` laid out: the head, the record, the system, the parts by name, and the seconds."""
-
-    head: xarray.Dataset
-    record: dict[str, Any]
-    system: System
-    parts: dict[str, Any]
-    seconds: float
+    def __init__(self, words: str, groups: Datasets, allow_code: bool, linear: LinearPart | None) -> None:
+        super().__init__(groups[""], allow_code, _CLASSES)
+        datasets = parts_of(groups, str(self.dataset.attrs["parts"]).splitlines(), words)
+        self.parts: dict[str, Any] = {n: branch_from_dataset(d, allow_code, linear) for n, d in datasets.items()}
+        self.of = self.system(self.record["system"])
 
     def named(self, beginning: str) -> list[Any]:
         """The parts whose names begin in one way, in order."""
         return [part for name, part in self.parts.items() if name.startswith(beginning)]
 
-
-def opened(
-    groups: Mapping[str, xarray.Dataset],
-    words: str,
-    allow_code: bool,
-    linear: LinearPart | None,
-    classes: Mapping[str, type] | None = None,
-) -> Opened:
-    """Read what `map_datasets` laid out; InputError where parts of `words` are missing."""
-    head = groups[""]
-    datasets = parts_of(groups, str(head.attrs["parts"]).splitlines(), words)
-    record = from_json(str(head["record"].item()), {**CLASSES, **(classes or {})})
-    parts = {name: branch_from_dataset(part, allow_code, linear) for name, part in datasets.items()}
-    system = build(record["system"], system_arrays(head), allow_code)
-    return Opened(head, record, system, parts, float(head.attrs.get("seconds", np.nan)))
+    def timed(self, item: Any) -> Any:
+        """A result that was read, with the seconds that it took."""
+        item.seconds = float(self.dataset.attrs.get("seconds", np.nan))
+        return item
 
 
-def piece_number(piece: MonotonePiece, pieces: Sequence[MonotonePiece]) -> int:
+def _table_head(item: IsolaMap | RegimeMap) -> xarray.Dataset:
+    import xarray
+
+    table = item.to_table()
+    columns = {parameter_column(name, ("record",)): ("row", column) for name, column in table.columns.items()}
+    return xarray.Dataset(columns, attrs={"title": table.title, "system": item.system.name})
+
+
+def _number(piece: MonotonePiece, pieces: Sequence[MonotonePiece]) -> int:
     """Which of the pieces of some curves one is."""
     for number, other in enumerate(pieces):
-        ends = zip((piece.nodes[0], piece.nodes[-1]), (other.nodes[0], other.nodes[-1]), strict=True)
-        if other.curve is piece.curve and all(one.orbit is same.orbit for one, same in ends):
+        if other.curve is piece.curve and all(other.nodes[end].orbit is piece.nodes[end].orbit for end in (0, -1)):
             return number
     raise InputError(f"a stretch over {piece.along} lies on none of the curves: it cannot be written to a file")
 
 
-def options_of(options: Mapping[str, Any]) -> dict[str, Any]:
+def _options(options: Mapping[str, Any]) -> dict[str, Any]:
     """Options of the verbs as a file holds them; a stability method of a user's own by its words, as of branches."""
     return {
-        name: repr(value) if isinstance(value, StabilityMethod) and type(value).__name__ not in CLASSES else value
+        name: repr(value) if isinstance(value, StabilityMethod) and type(value).__name__ not in _CLASSES else value
         for name, value in options.items()
     }
 
 
-#: the part of a map's file that holds its isolas
-_ISOLAS = "isolas"
-
-
-def isolas_to_datasets(isolas: Isolas) -> dict[str, xarray.Dataset]:
-    """The head under the name "", curves and closed branches under names of their own; the head lists them."""
+# -------------------------------------------------------------------------------------------------------------- isolas
+def _write_isolas(isolas: Isolas) -> dict[str, xarray.Dataset]:
     own = dict.fromkeys([*isolas.limit_points, *(piece.curve for isola in isolas for piece in isola.pieces)])
     curves = {f"limit_points_{i}": curve for i, curve in enumerate(c for c in own if c not in isolas.doublings)}
     curves |= {f"doublings_{i}": curve for i, curve in enumerate(isolas.doublings)}
-    closed = [branch for isola in isolas for branch in isola.known.values()]
-    record = {
-        "listed": len(isolas.limit_points),
-        "bounds": isolas.bounds,
-        "omega": isolas.omega,
-        "isolas": [_written_isola(isola, curves) for isola in isolas],
-    }
-    head = head_dataset(isolas)
-    variables = {name: (v.dims, v.values, v.attrs) for name, v in head.items()}
-    parts: dict[str, Branch] = {**curves, **{f"closed_{i}": branch for i, branch in enumerate(closed)}}
-    return map_datasets(isolas, variables, head.attrs, record, parts)
-
-
-def _written_isola(isola: Isola, curves: Mapping[str, TrackedBranch]) -> dict[str, Any]:
-    """What a file holds of one isola besides the numbers."""
     names = {curve: name for name, curve in curves.items()}
-    return {
-        "range": isola.range,
-        "reasons": isola.reasons,
-        "notes": isola.notes,
-        "ends": [None if end is None else _written_end(end, curves) for end in isola.ends],
-        "legs": [[names[p.curve], piece_number(p, pieces_of(p.curve, p.along))] for p in isola.pieces],
-        "options": options_of(isola.options),
-        "known": list(isola.known),
-    }
+    events = [(event, name, i) for name, curve in curves.items() for i, event in enumerate(curve.bifurcations.met)]
 
-
-def _written_end(end: IsolaEnd, curves: Mapping[str, TrackedBranch]) -> list[Any]:
-    """Kind, curve and place among its events of the event that an end is."""
-    for name, curve in curves.items():
-        for place, event in enumerate(curve.bifurcations.met):
+    def place(end: IsolaEnd) -> list[Any]:
+        """Kind, curve and place among its events of the event that an end is."""
+        for event, name, i in events:
             if event.orbit is end.orbit:
-                return [end.kind, name, place]
-    raise InputError(f"the {end!r} lies on none of the curves: it cannot be written to a file")
+                return [end.kind, name, i]
+        raise InputError(f"the {end!r} lies on none of the curves: it cannot be written to a file")
+
+    written = [
+        {
+            **{name: getattr(isola, name) for name in ("range", "reasons", "notes")},
+            "ends": [None if end is None else place(end) for end in isola.ends],
+            "legs": [[names[p.curve], _number(p, pieces_of(p.curve, p.along))] for p in isola.pieces],
+            "options": _options(isola.options),
+            "known": list(isola.known),
+        }
+        for isola in isolas
+    ]
+    record = {"listed": len(isolas.limit_points), "bounds": isolas.bounds, "omega": isolas.omega, "isolas": written}
+    parts: dict[str, Branch] = dict(curves)
+    parts |= {f"closed_{i}": b for i, b in enumerate(b for isola in isolas for b in isola.known.values())}
+    return _written(isolas, head_dataset(isolas), record, parts)
 
 
-def isolas_from_datasets(
-    groups: Mapping[str, xarray.Dataset], allow_code: bool = False, linear: LinearPart | None = None
-) -> Isolas:
-    """The isolas that `isolas_to_datasets` wrote."""
-    stored = opened(groups, "isolas", allow_code, linear)
-    record, parameter = stored.record, str(stored.head.attrs["isolas"])
-    closed = iter(stored.named("closed_"))
+def _read_isolas(groups: Datasets, allow_code: bool, linear: LinearPart | None) -> Isolas:
+    stored = _Opened("isolas", groups, allow_code, linear)
+    record, attributes = stored.record, stored.dataset.attrs
+    parameter, closed = str(attributes["isolas"]), iter(stored.named("closed_"))
+
+    def end(kind: str, curve: str, place: int) -> IsolaEnd:
+        event = stored.parts[curve].bifurcations.met[place]
+        if not isinstance(event, TrackedEvent):
+            raise InputError(f"an end of an isola is a {event.kind} that lies on no curve")
+        return IsolaEnd.of(event, parameter, kind == "isola_centre")
+
+    isolas = []
+    for given in record["isolas"]:
+        low, high = (None if stated is None else end(*stated) for stated in given["ends"])
+        pieces = tuple(pieces_of(stored.parts[curve], parameter)[number] for curve, number in given["legs"])
+        followed = {float(value): next(closed) for value in given["known"]}
+        isolas.append(Isola(
+            stored.of, parameter, record["omega"], (low, high), given["range"], given["reasons"], pieces,
+            given["options"], tuple(given["notes"]), followed,
+        ))  # fmt: skip
     # older files hold nothing else of an interruption
     older = Interruption() if any(note.startswith("interrupted") for note in record["notes"]) else None
-    isolas = Isolas(
-        [_isola(given, stored, parameter, closed) for given in record["isolas"]],
-        stored.system,
-        parameter,
-        record["bounds"],
-        record["omega"],
-        stored.named("limit_points_")[: record["listed"]],
-        stored.named("doublings_"),
-        record["notes"],
-        str(stored.head.attrs["said"]),
-        record.get("interruption", older),
-    )
-    isolas.seconds = stored.seconds
-    return isolas
-
-
-def _isola(given: Mapping[str, Any], stored: Opened, parameter: str, closed: Iterator[Branch]) -> Isola:
-    """One isola; the next of the closed branches are its own."""
-    low, high = (None if end is None else _read_end(end, stored, parameter) for end in given["ends"])
-    return Isola(
-        stored.system,
-        parameter,
-        stored.record["omega"],
-        (low, high),
-        given["range"],
-        given["reasons"],
-        tuple(pieces_of(stored.parts[curve], parameter)[number] for curve, number in given["legs"]),
-        given["options"],
-        tuple(given["notes"]),
-        {float(value): next(closed) for value in given["known"]},
-    )
-
-
-def _read_end(given: Sequence[Any], stored: Opened, parameter: str) -> IsolaEnd:
-    kind, curve, place = given
-    event = stored.parts[curve].bifurcations.met[place]
-    if not isinstance(event, TrackedEvent):
-        raise InputError(f"an end of an isola is a {event.kind} that lies on no curve")
-    return IsolaEnd.of(event, parameter, kind == "isola_centre")
+    return stored.timed(Isolas(
+        isolas, stored.of, parameter, record["bounds"], record["omega"],
+        stored.named("limit_points_")[: record["listed"]], stored.named("doublings_"), record["notes"],
+        str(attributes["said"]), record.get("interruption", older),
+    ))  # fmt: skip
 
 
 # ------------------------------------------------------------------------------------------------------------ the map
-def isola_map_to_datasets(isola_map: IsolaMap) -> dict[str, xarray.Dataset]:
-    """The head with `IsolaMap.to_table()` under the name "", the curves as `curve_0`, ..., the isolas under `isolas`.
-
-    `record` says of each region which isola and which curves it rests on, over which stretch of the second parameter,
-    between which two ends: a number, or a border by its number among those of all curves.
-    """
-    curves, borders = isola_map.curves, isola_map.borders()
-    found = [region.isola for region in isola_map.regions]
-    omega, within = found[0].omega if found else (np.nan, np.nan), isola_map.within or (np.nan, np.nan)
-    isolas = Isolas(found, isola_map.system, isola_map.parameter, within, omega)
-    record = {
-        **{name: getattr(isola_map, name) for name in ("parameter", "second", "within", "bounds")},
-        "regions": [
-            {
-                "isola": list(isolas).index(region.isola),
-                "curves": [curves.index(curve) for curve in region.curves],
-                "ends": [
-                    ["border", piece_number(end, borders)] if isinstance(end, MonotonePiece) else ["value", float(end)]
-                    for end in region.span.ends
-                ],
-                "span": {f: getattr(region.span, f) for f in ("low", "high", "reasons", "closed", "settled")},
-                "probes": list(region.probes),
-            }
-            for region in isola_map.regions
-        ],
-    }
-    parts = {f"{_ISOLAS}/{name}" if name else _ISOLAS: part for name, part in isolas_to_datasets(isolas).items()}
-    named = {f"curve_{i}": curve for i, curve in enumerate(curves)}
-    return map_datasets(isola_map, *table_head(isola_map), record, named) | parts
+_ISOLAS = "isolas"
+#: attributes of a map, of the span of a region, and of a regime map that records hold as they are
+_OF_MAP = ("parameter", "second", "within", "bounds")
+_OF_SPAN = ("low", "high", "reasons", "closed", "settled")
+_OF_REGIMES = ("parameter", "bounds", "omega", "depth", "resolution")
 
 
-def isola_map_from_datasets(
-    groups: Mapping[str, xarray.Dataset], allow_code: bool = False, linear: LinearPart | None = None
-) -> IsolaMap:
-    """The map that `isola_map_to_datasets` wrote."""
-    stored = opened(groups, "map", allow_code, linear, {"Probe": Probe})
+def _write_isola_map(made: IsolaMap) -> dict[str, xarray.Dataset]:
+    curves, borders = made.curves, made.borders()
+    found = [region.isola for region in made.regions]
+    omega, within = found[0].omega if found else (np.nan, np.nan), made.within or (np.nan, np.nan)
+    isolas = Isolas(found, made.system, made.parameter, within, omega)
+    regions = [
+        {
+            "isola": list(isolas).index(region.isola),
+            "curves": [curves.index(curve) for curve in region.curves],
+            "ends": [
+                ["border", _number(end, borders)] if isinstance(end, MonotonePiece) else ["value", float(end)]
+                for end in region.span.ends
+            ],
+            "span": {name: getattr(region.span, name) for name in _OF_SPAN},
+            "probes": list(region.probes),
+        }
+        for region in made.regions
+    ]
+    record = {**{name: getattr(made, name) for name in _OF_MAP}, "regions": regions}
+    parts = {f"{_ISOLAS}/{name}" if name else _ISOLAS: part for name, part in _write_isolas(isolas).items()}
+    return {**_written(made, _table_head(made), record, {f"curve_{i}": c for i, c in enumerate(curves)}), **parts}
+
+
+def _read_isola_map(groups: Datasets, allow_code: bool, linear: LinearPart | None) -> IsolaMap:
+    stored = _Opened("map", groups, allow_code, linear)
     record, curves = stored.record, list(stored.parts.values())
     own = {name[len(_ISOLAS) + 1 :]: part for name, part in groups.items() if name.split("/")[0] == _ISOLAS}
-    isolas = isolas_from_datasets(own, allow_code, linear)
-    parameter, second = record["parameter"], record["second"]
+    isolas = _read_isolas(own, allow_code, linear)
+    parameter, second, within, bounds = (record[name] for name in _OF_MAP)
     borders = [border for curve in curves for border in pieces_of(curve, second, parameter)]
     regions = []
     for given in record["regions"]:
         low, high = (borders[end] if kind == "border" else end for kind, end in given["ends"])
-        span = Span(ends=(low, high), **given["span"])
-        beside = tuple(curves[i] for i in given["curves"])
+        span, beside = Span(ends=(low, high), **given["span"]), tuple(curves[i] for i in given["curves"])
         regions.append(IsolaRegion(isolas[given["isola"]], second, span, beside, tuple(given["probes"])))
-    bounds, notes, interruption = record["bounds"], record["notes"], record["interruption"]
-    loaded = IsolaMap(regions, stored.system, parameter, second, record["within"], bounds, notes, interruption)
-    loaded.seconds = stored.seconds
-    return loaded
+    left = record["notes"], record["interruption"]
+    return stored.timed(IsolaMap(regions, stored.of, parameter, second, within, bounds, *left))
 
 
-register(Codec("isolas", Isolas, isolas_to_datasets, isolas_from_datasets))
-register(Codec("isola map", IsolaMap, isola_map_to_datasets, isola_map_from_datasets))
-
-
-def regime_map_to_datasets(regimes: RegimeMap) -> dict[str, xarray.Dataset]:
-    """The head under the name "", curves and branches under names of their own."""
+# --------------------------------------------------------------------------------------------------------- regime maps
+def _write_regimes(regimes: RegimeMap) -> dict[str, xarray.Dataset]:
     pieces = [piece for curve in regimes.curves for piece in pieces_of(curve, regimes.parameter)]
     slices = list(dict.fromkeys(strip.slice for strip in regimes.strips if strip.slice is not None))
-    curves: dict[str, Branch] = {f"curve_{i}": curve for i, curve in enumerate(regimes.curves)}
     on_arcs = {id(point) for each in slices for arc in each.arcs for point in arc.points}
     met = (branch for each in slices for branch, _ in each.branches)
-    used = [branch for branch in met if any(id(point) in on_arcs for point in branch.points)]
-    branches = {f"branch_{i}": branch for i, branch in enumerate(used)}
+    used = (branch for branch in met if any(id(point) in on_arcs for point in branch.points))
+    branches: dict[str, Branch] = {f"branch_{i}": branch for i, branch in enumerate(used)}
     places = {id(point): (n, i) for n, branch in branches.items() for i, point in enumerate(branch.points)}
+
+    def written(arc: Arc) -> dict[str, Any]:
+        points = [places[id(point)] for point in arc.points]
+        numbers = [None if edge.border is None else _number(edge.border, pieces) for edge in arc.edges]
+        return {
+            **{name: getattr(arc, name) for name in ("nu", "isolated", "followed")},
+            "branch": points[0][0] if points else None,
+            "points": [index for _, index in points],
+            "edges": [(e.omega, number, e.kind, e.bound) for e, number in zip(arc.edges, numbers, strict=True)],
+        }
+
     record = {
-        **{name: getattr(regimes, name) for name in ("parameter", "bounds", "omega", "depth", "resolution")},
-        "options": options_of(regimes.options),
-        "slices": [
-            {"value": each.value, "arcs": [_written_arc(arc, places, pieces) for arc in each.arcs]} for each in slices
-        ],
+        **{name: getattr(regimes, name) for name in _OF_REGIMES},
+        "options": _options(regimes.options),
+        "slices": [{"value": each.value, "arcs": [written(arc) for arc in each.arcs]} for each in slices],
         "strips": [
             (s.low, s.high, None if s.slice is None else slices.index(s.slice), s.examined) for s in regimes.strips
         ],
     }
-    return map_datasets(regimes, *table_head(regimes), record, curves | branches)
+    return _written(
+        regimes, _table_head(regimes), record, {f"curve_{i}": c for i, c in enumerate(regimes.curves)} | branches
+    )
 
 
-def _written_arc(arc: Arc, places: Mapping[int, tuple[str, int]], pieces: Sequence[MonotonePiece]) -> dict[str, Any]:
-    points = [places[id(point)] for point in arc.points]
-    return {
-        "nu": arc.nu,
-        "isolated": arc.isolated,
-        "followed": arc.followed,
-        "branch": points[0][0] if points else None,
-        "points": [index for _, index in points],
-        "edges": [
-            (e.omega, None if e.border is None else piece_number(e.border, pieces), e.kind, e.bound) for e in arc.edges
-        ],
-    }
-
-
-def regime_map_from_datasets(
-    groups: Mapping[str, xarray.Dataset], allow_code: bool = False, linear: LinearPart | None = None
-) -> RegimeMap:
-    """The map that `regime_map_to_datasets` wrote."""
-    stored = opened(groups, "map", allow_code, linear)
+def _read_regimes(groups: Datasets, allow_code: bool, linear: LinearPart | None) -> RegimeMap:
+    stored = _Opened("map", groups, allow_code, linear)
     record, branches, curves = stored.record, stored.parts, stored.named("curve_")
-    name, bounds, omega = record["parameter"], record["bounds"], SearchRange(*record["omega"])
-    given = stored.system, name, bounds, omega, "adaptive", record["options"], len(curves)
-    catalogue = Catalogue(*given, notes=list(record["notes"]), interruption=record["interruption"])
+    parameter, bounds, omega, depth, resolution = (record[name] for name in _OF_REGIMES)
+    asked = stored.of, parameter, bounds, SearchRange(*omega), "adaptive", record["options"], len(curves)
+    catalogue = Catalogue(*asked, notes=list(record["notes"]), interruption=record["interruption"])
     for curve in curves:
         catalogue.add(curve)
-    pieces = catalogue.pieces
+
+    def arc(given: Mapping[str, Any]) -> Arc:
+        first, last = (
+            Edge(omega, None if number is None else catalogue.pieces[number], kind, bound)
+            for omega, number, kind, bound in given["edges"]
+        )
+        points = tuple(branches[given["branch"]].points[i] for i in given["points"])
+        return Arc(given["nu"], given["isolated"], (first, last), points, given["followed"])
+
     slices = []
     for given in record["slices"]:
         met = [(branches[name], False) for name in dict.fromkeys(arc["branch"] for arc in given["arcs"]) if name]
-        arcs = [_arc(arc, branches, pieces) for arc in given["arcs"]]
-        slices.append(Slice(given["value"], catalogue, 2 ** record["depth"], branches=met, arcs=arcs))
-    strips = [
-        Strip(low, high, None if number is None else slices[number], examined)
-        for low, high, number, examined in record["strips"]
-    ]
-    regimes = RegimeMap(catalogue, strips, record["depth"], record["resolution"])
-    regimes.seconds = stored.seconds
-    return regimes
+        slices.append(Slice(given["value"], catalogue, 2**depth, branches=met, arcs=[arc(a) for a in given["arcs"]]))
+    strips = [Strip(low, high, None if i is None else slices[i], seen) for low, high, i, seen in record["strips"]]
+    return stored.timed(RegimeMap(catalogue, strips, depth, resolution))
 
 
-def _arc(given: Mapping[str, Any], branches: Mapping[str, Branch], pieces: Sequence[MonotonePiece]) -> Arc:
-    first, last = (
-        Edge(omega, None if number is None else pieces[number], kind, bound)
-        for omega, number, kind, bound in given["edges"]
-    )
-    points = tuple(branches[given["branch"]].points[i] for i in given["points"])
-    return Arc(given["nu"], given["isolated"], (first, last), points, given["followed"])
-
-
-register(Codec("regime map", RegimeMap, regime_map_to_datasets, regime_map_from_datasets))
+register(Codec("isolas", Isolas, _write_isolas, _read_isolas))
+register(Codec("isola map", IsolaMap, _write_isola_map, _read_isola_map))
+register(Codec("regime map", RegimeMap, _write_regimes, _read_regimes))
