@@ -58,7 +58,7 @@ from .harmonic import (
 )
 from .maps.isolas.map import IsolaMap as IsolaMap, isola_map as isola_map
 from .maps.isolas.result import Isola as Isola, Isolas as Isolas
-from .maps.isolas.verb import find_isolas as find_isolas
+from .maps.isolas.search import find_isolas as find_isolas
 from .maps.regimes.map import RegimeMap as RegimeMap
 from .maps.regimes.verb import regime_map as regime_map
 from .model import (

@@ -8,8 +8,7 @@ import pytest
 import suboctave as so
 from suboctave.analysis.diagram import Followed, grown_from
 from suboctave.maps.catalogue import Catalogue, SearchRange, carrier_of
-from suboctave.maps.regimes.map import RegimeMap
-from suboctave.maps.regimes.slices import Arc, Edge, Slice, Strip
+from suboctave.maps.regimes.map import Arc, Edge, RegimeMap, Slice, Strip
 
 DAMPING, STIFF = 0.1, 1.0
 
@@ -44,7 +43,7 @@ def test_a_raster_has_no_limit_of_arcs():
     """Seventy overlapping stable arcs: every cell has the label of its centre."""
     arcs = [Arc(1 + i % 3, False, (Edge(1.0 + 0.01 * i), Edge(1.5 + 0.02 * i)), ()) for i in range(70)]
     catalogue = Catalogue(duffing(), "F", (0.0, 1.0), SearchRange(0.5, 3.5), "adaptive", {}, 1)
-    strips = [Strip(0.0, 0.5, Slice(0.2, catalogue, 4, arcs=arcs), True), Strip(0.5, 1.0, None, False)]
+    strips = [Strip(0.0, 0.5, Slice(0.2, arcs=arcs), True), Strip(0.5, 1.0, None, False)]
     regimes = RegimeMap(catalogue, strips, 2, 1e-4)
     cells, labels = regimes.raster(90, 4)
     omega = 0.5 + (np.arange(90) + 0.5) / 90 * 3.0

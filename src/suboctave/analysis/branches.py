@@ -90,7 +90,12 @@ def frequency_response(
     run = CurveRun(system, "omega", (first, last), harmonics, settings_of(system, options))
     if isinstance(start, BranchPoint | Bifurcation):
         start = start.orbit
-    nu = _period(start, subharmonic)
+    nu = start.basis.nu if isinstance(start, PeriodicOrbit) else 1
+    if subharmonic not in (None, 1):
+        order = check_order(subharmonic)
+        if isinstance(start, PeriodicOrbit) and nu != order:
+            raise InputError(f"subharmonic={order}, but start is a motion of {nu} load periods: leave one of them out")
+        nu = order
     curve = run.curve(first, nu, linear)
     with run.reporting(options.get("progress"), "frequency response") as run:
         # in a fresh installation the start waits for kernels to be compiled
@@ -101,17 +106,6 @@ def frequency_response(
             given = _written(harmonics, options, subharmonic=subharmonic, linear=linear)
             trace = _from_end(curve, start, run, f"so.frequency_response(system, ({last!r}, {first!r}){given})")
     return run.branch(trace)
-
-
-def _period(start: Any, subharmonic: int | None) -> int:
-    """Period, in periods of the load, of the motions that begin at `start`."""
-    nu = start.basis.nu if isinstance(start, PeriodicOrbit) else 1
-    if subharmonic is None or subharmonic == 1:
-        return nu
-    order = check_order(subharmonic)
-    if isinstance(start, PeriodicOrbit) and nu != order:
-        raise InputError(f"subharmonic={order}, but start is a motion of {nu} load periods: leave one of them out")
-    return order
 
 
 @with_options(CurveOptions)

@@ -11,6 +11,7 @@ import sys
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Protocol, Unpack
 
 from suboctave.analysis.branches import frequency_response, switch_branch
@@ -135,27 +136,15 @@ def grown_from(branch: Branch, followed: Followed, options: SearchOptions) -> Bi
     return BifurcationDiagram(root, stopped, interruption)
 
 
-def _returned(branch: Branch, omega: tuple[float, float]) -> bool:
-    """Whether a response folds back and leaves the range where it began, so that the other end lies on another one."""
-    return len(branch) > 1 and not branch.closed and not branch.interrupted and float(branch.omega[-1]) == omega[0]
-
-
+@dataclass
 class _Growth:
     """How the branches of a diagram are followed: options of the verbs, which and how many, progress, and a keeper."""
 
-    def __init__(
-        self,
-        options: SearchOptions,
-        followed: Followed,
-        most: int = sys.maxsize,
-        report: Report | None = None,
-        keeper: Keeper | None = None,
-    ) -> None:
-        self.options = options
-        self.followed = followed
-        self.most = most
-        self.report = report
-        self.keeper = keeper
+    options: SearchOptions
+    followed: Followed
+    most: int = sys.maxsize
+    report: Report | None = None
+    keeper: Keeper | None = None
 
     def _reporting(self, number: int, count: int, title: str) -> SearchOptions:
         """The options of one of `count` branches, whose progress is a part of the diagram's."""
@@ -185,7 +174,9 @@ class _Growth:
         first = response(-1, omega, "T")
         root = DiagramBranch(first)
         failure = ""
-        if start is None and _returned(first, omega):
+        # one that folds back and leaves the range where it began: the other end lies on another one
+        whole = first.closed or first.interrupted or len(first) < 2
+        if start is None and not whole and float(first.omega[-1]) == omega[0]:
             try:
                 other = response(_OTHER_END, (omega[1], omega[0]), "T from the other end")
                 root.children.append(DiagramBranch(other, number=_OTHER_END))
@@ -193,12 +184,6 @@ class _Growth:
                 failure = f"the response from the other end was not found: {why}"
         stopped, interruption = self.grown(root)
         return BifurcationDiagram(root, "; ".join(reason for reason in (stopped, failure) if reason), interruption)
-
-    def switched(self, node: DiagramBranch, item: Bifurcation, number: int, count: int) -> Branch:
-        """The branch that leaves another at a bifurcation, the `number`-th of `count`."""
-        options = self._reporting(number, count, f"{item.kind} {item.parameter(item.parameter_name):.6g}")
-        event = next(i for i, other in enumerate(events_met(node.branch)) if other is item) if self.keeper else -1
-        return self._kept(node.number, event, lambda: switch_branch(item, **options))
 
     def grown(self, root: DiagramBranch) -> tuple[str, Interruption | None]:
         """Follow what leaves the branches, level by level; why that ended early, in words, and what interrupted it."""
@@ -209,7 +194,7 @@ class _Growth:
             node = waiting.popleft()
             switched = [b for b in node.branch.bifurcations if b.kind in _SWITCHED]
             known = _shared(node)
-            span = _span(node.branch)
+            span = span_of(node.branch)
             for number, item in enumerate(switched):
                 if any(end.same_place(item, span, beside) for end, beside in known):
                     continue
@@ -217,8 +202,11 @@ class _Growth:
                 if full or interruption is not None or not self.followed(node, item):
                     node.left.append(item)
                     continue
+                title = f"{item.kind} {item.parameter(item.parameter_name):.6g}"
                 try:
-                    branch = self.switched(node, item, number, len(switched))
+                    options = self._reporting(number, len(switched), title)
+                    event = next(i for i, b in enumerate(events_met(node.branch)) if b is item) if self.keeper else -1
+                    branch = self._kept(node.number, event, partial(switch_branch, item, **options))
                 except (ConvergenceError, InputError) as failure:
                     node.failures.append((item, str(failure)))
                     continue
@@ -250,10 +238,11 @@ def _shared(node: DiagramBranch) -> list[tuple[Junction, PeriodicOrbit]]:
     if origin is not None and origin.kind == "BP":
         # a branch that crosses its parent lists the points where it does, among others
         crossed = [(Junction.of(b), b.orbit) for b in branch.bifurcations["BP"]]
-        shared += [(j, here) for j, here in crossed if any(j.same_place(b, _span(branch), here) for b in node.met)]
+        shared += [(j, here) for j, here in crossed if any(j.same_place(b, span_of(branch), here) for b in node.met)]
     return shared
 
 
-def _span(branch: Branch) -> float:
+def span_of(branch: Branch) -> float:
+    """Width of the range in which a branch was followed."""
     first, last = branch.options["bounds"][branch.name]
     return abs(last - first)

@@ -234,18 +234,8 @@ class CurveRun:
         bifurcations, events = (
             [replace(b, context=context) for b in items] for items in (trace.bifurcations, trace.events)
         )
+        met = (None if item is None else Junction.of(item) for item in (trace.departs, trace.arrives))
         return Branch(
-            self.system,
-            self.name,
-            trace.points,
-            bifurcations,
-            events,
-            trace.closed,
-            trace.endings,
-            self.settings.observe,
-            options,
-            tuple(trace.sentences),
-            trace.audit,
-            None if trace.departs is None else Junction.of(trace.departs),
-            None if trace.arrives is None else Junction.of(trace.arrives),
-        )
+            self.system, self.name, trace.points, bifurcations, events, trace.closed, trace.endings,
+            self.settings.observe, options, tuple(trace.sentences), trace.audit, *met,
+        )  # fmt: skip

@@ -72,6 +72,13 @@ class Seeds:
             check_count(f"Seeds: {name}", getattr(self, name))
 
 
+def check_seeds(seeds: Any) -> Seeds | None:
+    """How finely resonances are searched, None for a default."""
+    if seeds is not None and not isinstance(seeds, Seeds):
+        raise InputError(f"seeds must be a Seeds, not {type(seeds).__name__}")
+    return seeds
+
+
 def check_order(order: Any) -> int:
     """A sub-harmonic's order: a whole number of load periods, at least 2."""
     return check_count("subharmonic", order, 2)
@@ -106,12 +113,11 @@ def find_subharmonics(
     order = check_order(subharmonic)
     ends = check_range("omega", omega, positive=True)
     check_system(system, ends)
-    if seeds is not None and not isinstance(seeds, Seeds):
-        raise InputError(f"seeds must be a Seeds, not {type(seeds).__name__}")
+    fine = check_seeds(seeds) or Seeds()
     run = CurveRun(system, "omega", ends, harmonics, settings_of(system, options))
     curve = run.curve(ends[0], order, linear)
     with run.reporting(options.get("progress"), f"{period_name(order)} motions") as run:
-        return Branches.of(_branches(curve, seeds or Seeds(), run))
+        return Branches.of(_branches(curve, fine, run))
 
 
 class Branches(list[Branch]):
@@ -139,15 +145,15 @@ def isolated_branches(
     omega: tuple[float, float],
     order: int,
     known: Sequence[Branch],
-    harmonics: Harmonics = "adaptive",
+    harmonics: Harmonics,
     *,
-    seeds: Seeds | None = None,
+    seeds: Seeds,
     **options: Unpack[SearchOptions],
 ) -> list[Branch]:
     """As `find_subharmonics`, without the branches that are known."""
     run = CurveRun(system, "omega", omega, harmonics, settings_of(system, options))
     with one_thread():
-        branches = list(_branches(run.curve(omega[0], order, None), seeds or Seeds(), run, known))
+        branches = list(_branches(run.curve(omega[0], order, None), seeds, run, known))
     for branch in branches:
         pass_on(branch.interruption)
     return branches

@@ -50,6 +50,7 @@ from suboctave.harmonic.perturbation import Kind
 from suboctave.harmonic.truncation import AdaptiveHarmonics
 from suboctave.kinds import KINDS, MOTION_KINDS, TRACKED_KINDS
 from suboctave.model.inputs import check_bounds, check_parameter, check_range, timed
+from suboctave.model.system import System
 from suboctave.options import with_options
 from suboctave.progress import reporting
 from suboctave.results.branch import TrackedBranch
@@ -159,33 +160,18 @@ def _settings(item: Bifurcation, turning: str, options: TrackOptions) -> Setting
 
 
 def _branch(
-    item: Bifurcation,
-    names: tuple[str, ...],
-    turning: str,
-    trace: Trace,
-    settings: Settings,
-    options: dict[str, Any],
+    item: Bifurcation, names: tuple[str, ...], turning: str, trace: Trace, settings: Settings, options: dict[str, Any]
 ) -> TrackedBranch:
     """The curve that begins at a bifurcation, with how it was computed."""
-    system = item.orbit.system
-    if kind_of(item) in MOTION_KINDS:
+    system, kind = item.orbit.system, kind_of(item)
+    if kind in MOTION_KINDS:
         options = {**options, "onto": item.context["onto"]}
     context = {"system": system, "parameter": names[-1], **options}
+    met = [replace(event, context=context) for event in trace.bifurcations]
     return TrackedBranch(
-        kind_of(item),
-        names,
-        system,
-        names[-1],
-        trace.points,
-        [replace(event, context=context) for event in trace.bifurcations],
-        [],
-        trace.closed,
-        trace.endings,
-        settings.observe,
-        options,
-        tuple(trace.warnings),
-        turning=turning,
-    )
+        kind, names, system, names[-1], trace.points, met, [], trace.closed, trace.endings, settings.observe, options,
+        tuple(trace.warnings), turning=turning,
+    )  # fmt: skip
 
 
 def _third(item: TrackedEvent, parameter: Any, bounds: Any, omega: Any) -> tuple[tuple[str, ...], dict[str, Range]]:
@@ -205,25 +191,23 @@ def _third(item: TrackedEvent, parameter: Any, bounds: Any, omega: Any) -> tuple
         raise InputError(f"{parameter} is free on the curve of this extremum already: name a third parameter")
     if omega is not None and item.names[0] != "omega":
         raise InputError("omega= bounds omega where it is free, which it is not on the curve of this extremum")
-    ranges = {name: kept for name in item.names if (kept := _kept(item, name)) is not None}
-    if omega is not None:
-        ranges = {"omega": check_range("omega", omega, positive=True), **ranges}
-    ranges[parameter] = check_bounds(system, parameter, bounds)
+    # a parameter of the extremum's curve keeps its range; if it is extreme, with as much again on both sides. That of
+    # omega is often no more than where bifurcations were looked for
+    kept: dict[str, Range] = {}
+    for name in item.names:
+        known = Inherited(item).range(name)
+        if known is not None and name != "omega":
+            low, high = sorted(known)
+            more = high - low if name == item.parameter_name else 0.0
+            kept[name] = low - more, high + more
+    ranges = _ranges(system, omega, kept, parameter, bounds)
     _check_inside(item, {name: ranges[name] for name in (item.names[0], parameter) if name in ranges})
     return (*item.names, parameter), ranges
 
 
-def _kept(item: TrackedEvent, name: str) -> Range | None:
-    """The range that a parameter of an extremum's curve keeps; if it is extreme, with as much again on both sides.
-
-    None for omega, whose range is often no more than where bifurcations were looked for.
-    """
-    given = Inherited(item).range(name)
-    if given is None or name == "omega":
-        return None
-    low, high = sorted(given)
-    more = high - low if name == item.parameter_name else 0.0
-    return low - more, high + more
+def _ranges(system: System, omega: Any, kept: Mapping[str, Range], parameter: str, bounds: Any) -> dict[str, Range]:
+    own = {} if omega is None else {"omega": check_range("omega", omega, positive=True)}
+    return {**own, **kept, parameter: check_bounds(system, parameter, bounds)}
 
 
 def _free(item: Bifurcation, parameter: Any, bounds: Any, omega: Any) -> tuple[tuple[str, ...], dict[str, Range]]:
@@ -243,8 +227,7 @@ def _free(item: Bifurcation, parameter: Any, bounds: Any, omega: Any) -> tuple[t
         if parameter == "omega":
             raise InputError("omega is free already: parameter= names the second one, omega=(from, to) bounds omega")
         check_parameter(system, parameter)
-        ranges = {} if omega is None else {"omega": check_range("omega", omega, positive=True)}
-        ranges[parameter] = check_bounds(system, parameter, bounds)
+        ranges = _ranges(system, omega, {}, parameter, bounds)
     else:
         both = tuple(parameter) if isinstance(parameter, Sequence) else ()
         if len(both) != 2 or not all(isinstance(name, str) for name in both) or both[0] == both[1]:

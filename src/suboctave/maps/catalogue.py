@@ -7,15 +7,16 @@ a curve a branch can be followed at any value that the curve reaches.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from suboctave.analysis.branches import continue_branch, switch_branch
-from suboctave.analysis.diagram import Followed, diagram_of
+from suboctave.analysis.diagram import Followed, diagram_of, span_of
 from suboctave.analysis.options import SearchOptions, handed_on, settings_of
 from suboctave.analysis.subharmonics import Seeds, isolated_branches
 from suboctave.analysis.track import track
@@ -35,6 +36,11 @@ from suboctave.model.system import System
 from suboctave.progress import reporting
 from suboctave.results.branch import Branch, TrackedBranch
 from suboctave.results.diagram import BifurcationDiagram
+from suboctave.store.registry import Stored
+from suboctave.store.table import Table
+
+if TYPE_CHECKING:
+    import pandas
 
 #: share of the range of omega by which branches are followed beyond what they are to hold
 _MARGIN = 0.02
@@ -63,6 +69,24 @@ class SearchRange(NamedTuple):
         margin = _MARGIN * (max(self.high, *inside) - min(self.low, *inside)) if inside else 0.0
         low = min([self.low, *(place - margin for place in inside)])
         return SearchRange(max(low, 0.5 * min([self.low, *inside])), max([self.high, *(p + margin for p in inside)]))
+
+
+class PlaneMap(Stored, ABC):
+    """What is known over a plane of two parameters."""
+
+    @abstractmethod
+    def to_table(self) -> Table:
+        """The borders in the plane, point by point."""
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """`to_table` as a table of pandas."""
+        return self.to_table().to_dataframe()
+
+    @staticmethod
+    def _check_reach(name: str, value: Any, within: tuple[float, float]) -> None:
+        low, high = within
+        if not is_number(value) or not low <= value <= high:
+            raise InputError(f"the map reaches from {name} = {low:g} to {high:g}, not to {value!r}")
 
 
 _KEPT = "what is here is what had been found by then"
@@ -180,7 +204,7 @@ class Catalogue(Work):
                     return
 
     def resonant(
-        self, value: float, order: int, seeds: Seeds, known: Sequence[Branch], share: float = 0.0
+        self, value: float, order: int, seeds: Seeds | None, known: Sequence[Branch], share: float = 0.0
     ) -> list[Branch]:
         """Branches of a period at a value that a search among resonances meets, without those that are known.
 
@@ -188,9 +212,9 @@ class Catalogue(Work):
         """
         where = f"searching {period_name(order)} motions at {self.name} = {value:.6g}"
         self.progress(share, where)
-        at = self.at(value), self.omega, order, known, self.harmonics
         try:
-            return isolated_branches(*at, seeds=seeds, **self.options)
+            at = self.at(value), self.omega, order, known, self.harmonics
+            return isolated_branches(*at, seeds=seeds or _COARSE, **self.options)
         except ConvergenceError as failure:
             self.note(f"{where}: {failure}")
             return []
@@ -297,10 +321,9 @@ def carrier_of(branch: Branch, attached: Iterable[Branch], options: SearchOption
 
 def _links(doubled: Branch, branch: Branch) -> bool:
     """Whether a branch of twice the period has one end, not both, at a period doubling of another branch."""
-    first, last = doubled.options["bounds"][doubled.name]
     doublings = branch.bifurcations["PD"]
     ends = [
-        any(junction.same_place(item, abs(last - first), beside) for item in doublings)
+        any(junction.same_place(item, span_of(doubled), beside) for item in doublings)
         for junction, beside in doubled.junctions
         if junction.nu == branch.nu
     ]
@@ -320,19 +343,12 @@ def _turns_back(branch: Branch, item: Bifurcation) -> bool:
 #: values of a parameter at which whole responses are followed
 MOST_VALUES = 10_000
 #: a search among resonances: coarse, since the branches themselves are followed afterwards
-COARSE = Seeds(8, 4, 3)
+_COARSE = Seeds(8, 4, 3)
 
 
 def listed(values: Any) -> list[Any]:
     """The items of a sequence or an array; a single None for anything else."""
     return list(values) if isinstance(values, Sequence | np.ndarray) and not isinstance(values, str) else [None]
-
-
-def check_seeds(seeds: Any) -> Seeds | None:
-    """How finely resonances are searched."""
-    if seeds is not None and not isinstance(seeds, Seeds):
-        raise InputError(f"seeds must be a Seeds, not {type(seeds).__name__}")
-    return seeds
 
 
 def checked_orders(search: Any, least: int) -> tuple[int, ...]:

@@ -36,8 +36,7 @@ from suboctave.maps.catalogue import Catalogue, SearchRange
 from suboctave.maps.isolas.map import IsolaMap, IsolaRegion, Probe, Span
 from suboctave.maps.isolas.result import Isola, IsolaEnd, Isolas, head_dataset
 from suboctave.maps.pieces import MonotonePiece, pieces_of
-from suboctave.maps.regimes.map import RegimeMap
-from suboctave.maps.regimes.slices import Arc, Edge, Slice, Strip
+from suboctave.maps.regimes.map import Arc, Edge, RegimeMap, Slice, Strip
 from suboctave.results.branch import Branch
 from suboctave.results.files import branch_from_dataset, branch_to_dataset
 from suboctave.store.layout import parameter_column
@@ -268,7 +267,7 @@ def _read_regimes(groups: Datasets, allow_code: bool, linear: LinearPart | None)
     slices = []
     for given in record["slices"]:
         met = [(branches[name], False) for name in dict.fromkeys(arc["branch"] for arc in given["arcs"]) if name]
-        slices.append(Slice(given["value"], catalogue, 2**depth, branches=met, arcs=[arc(a) for a in given["arcs"]]))
+        slices.append(Slice(given["value"], met, [arc(a) for a in given["arcs"]]))
     strips = [Strip(low, high, None if i is None else slices[i], seen) for low, high, i, seen in record["strips"]]
     return stored.timed(RegimeMap(catalogue, strips, depth, resolution))
 

@@ -21,6 +21,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from suboctave.analysis.diagram import span_of
 from suboctave.bifurcation.bifurcation import Bifurcation, TrackedEvent
 from suboctave.continuation.linear import one_thread
 from suboctave.continuation.problem import Array
@@ -241,8 +242,9 @@ def pieces_of(curve: TrackedBranch, along: str, name: str = "omega") -> list[Mon
 
     Along a curve of extrema a point of codimension two is no turn: there `along` goes on.
     """
-    met = (event for event in curve.bifurcations.met if isinstance(event, TrackedEvent))
-    turns = sorted((e for e in met if _turns(e, along, bool(curve.turning))), key=lambda e: e.arclength)
+    met = [event for event in curve.bifurcations.met if isinstance(event, TrackedEvent)]
+    extrema = [e for e in met if e.kind == "extremum" and e.parameter_name == along]
+    turns = sorted([*extrema, *(e for e in met if e.kind == "CP" and not curve.turning)], key=lambda e: e.arclength)
     events: list[TrackedEvent | None] = [None, *turns, None]
     points = curve.tracked[:-1] if curve.closed and turns else curve.tracked
     pieces: list[Piece] = []
@@ -262,13 +264,6 @@ def pieces_of(curve: TrackedBranch, along: str, name: str = "omega") -> list[Mon
 def as_point(item: Bifurcation) -> TrackedPoint:
     """A located bifurcation as a point of a tracked curve."""
     return TrackedPoint(item.orbit, item.floquet, item.arclength, 0)
-
-
-def _turns(event: TrackedEvent, along: str, of_extrema: bool) -> bool:
-    """Whether the curve of an event turns there in a parameter."""
-    if event.kind == "extremum":
-        return event.parameter_name == along
-    return event.kind == "CP" and not of_extrema
 
 
 def _one_way(
@@ -367,8 +362,7 @@ def _met(known: Sequence[Bifurcation], branch: Branch, end: int) -> Bifurcation 
     junction = branch.arrives if end else branch.departs
     if junction is None:
         return None
-    first, last = branch.options["bounds"][branch.name]
-    span, beside = abs(last - first), branch.points[end].orbit
+    span, beside = span_of(branch), branch.points[end].orbit
     alike = [b for b in known if b.orbit.basis.nu == junction.nu and junction.same_place(b, span, beside)]
     return min(alike, key=lambda b: abs(b.omega - junction.omega), default=None)
 

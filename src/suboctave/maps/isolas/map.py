@@ -17,7 +17,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -30,18 +30,14 @@ from suboctave.curves.junction import period_name
 from suboctave.curves.points import TrackedPoint
 from suboctave.errors import ConvergenceError, InputError, is_number, suggest
 from suboctave.interruption import Interruption, pass_on
-from suboctave.maps.catalogue import FAILURES, SearchRange, Work, branch_through, carrier_of, checked_values
+from suboctave.maps.catalogue import FAILURES, PlaneMap, SearchRange, Work, branch_through, carrier_of, checked_values
 from suboctave.maps.isolas.result import Isola, IsolaEnd, Isolas
 from suboctave.maps.pieces import MonotonePiece, across, pieces_of
 from suboctave.model.inputs import check_bounds, check_parameter, timed
 from suboctave.model.system import System
 from suboctave.results.branch import TrackedBranch
 from suboctave.store.layout import parameter_column
-from suboctave.store.registry import Stored
 from suboctave.store.table import Table
-
-if TYPE_CHECKING:
-    import pandas
 
 #: where the map is held against closed branches, in shares of the stretch of the second parameter
 _PROBED = (0.1, 0.5, 0.9)
@@ -140,13 +136,7 @@ class _Regions(Work):
     tracked: list[tuple[IsolaEnd, TrackedBranch]] = field(default_factory=list)
 
     def follow(self, isola: Isola, probes: Any) -> None:
-        """Follow the ends of an isola, and hold what they enclose against closed branches."""
-        region = self._region(isola)
-        if region is not None:
-            self.regions.append(replace(region, probes=tuple(self._probes(region, probes))))
-
-    def _region(self, isola: Isola) -> IsolaRegion | None:
-        """The region of one isola, None where an end could not be followed at all."""
+        """The region of an isola, if its ends can be followed, and what closed branches within say of it."""
         name, second = self.name, self.second
         here = float(self.system.parameters[second])
         ends: list[MonotonePiece | float] = []
@@ -163,17 +153,18 @@ class _Regions(Work):
                 curve = self._curve(end)
             except ConvergenceError as failure:
                 self.notes.append(f"the {end.kind.replace('_', ' ')} could not be followed over {second}: {failure}")
-                return None
+                return
             borders = [b for b in pieces_of(curve, second, name) if b.contains(here)]
             if not borders:
                 self.notes.append(f"the curve of {end!r} does not pass {second} = {here:g}")
-                return None
+                return
             ends.append(min(borders, key=lambda b: abs(float(b.across(here)) - float(end))))
             if curve not in curves:
                 curves.append(curve)
         span = spans_of(here, (ends[0], ends[1]), self.bounds, second)
         self.notes += [reason for reason, settled in zip(span.reasons, span.settled, strict=True) if not settled]
-        return IsolaRegion(isola, second, span, tuple(curves))
+        region = IsolaRegion(isola, second, span, tuple(curves))
+        self.regions.append(replace(region, probes=tuple(self._probes(region, probes))))
 
     def _curve(self, end: IsolaEnd) -> TrackedBranch:
         """The curve of an extremum, once for all isolas that share it."""
@@ -228,6 +219,7 @@ class _Regions(Work):
         return Probe(place, middle, (low, high), True, disagreement)
 
 
+Ends: TypeAlias = tuple[MonotonePiece | float, MonotonePiece | float]
 _WORDS = {"isola_centre": "birth (isola centre)", "isola_merging": "merging"}
 #: shares of the range of s that are rounding
 _ROUNDING = 1e-9
@@ -243,7 +235,7 @@ class Span:
 
     low: float
     high: float
-    ends: tuple[MonotonePiece | float, MonotonePiece | float]
+    ends: Ends
     reasons: tuple[str, str]
     closed: tuple[bool, bool]
     settled: tuple[bool, bool]
@@ -265,12 +257,7 @@ class Span:
         return values, low, high
 
 
-def spans_of(
-    start: float,
-    ends: tuple[MonotonePiece | float, MonotonePiece | float],
-    bounds: tuple[float, float],
-    second: str,
-) -> Span:
+def spans_of(start: float, ends: Ends, bounds: tuple[float, float], second: str) -> Span:
     """The stretch of s around `start` over which both ends can be followed."""
     sides = (_reached(start, ends, bounds, second, upper) for upper in (False, True))
     (low, high), reasons, closed, settled = zip(*sides, strict=True)
@@ -278,19 +265,19 @@ def spans_of(
 
 
 def _reached(
-    start: float,
-    ends: tuple[MonotonePiece | float, MonotonePiece | float],
-    bounds: tuple[float, float],
-    second: str,
-    upper: bool,
+    start: float, ends: Ends, bounds: tuple[float, float], second: str, upper: bool
 ) -> tuple[float, str, bool, bool]:
     """How far in one direction: the value of s, why no further, whether the range closes, whether that is settled."""
     bound, slack = bounds[upper], _ROUNDING * (bounds[1] - bounds[0])
-    edges = {end: end.high if upper else end.low for end in ends if isinstance(end, MonotonePiece)}
+    followed = [end for end in ends if isinstance(end, MonotonePiece)]
+    edges = {end: end.high if upper else end.low for end in followed}
     reach = (min if upper else max)([bound, *edges.values()])
-    crossed = _crossing(start, reach, ends, upper)
-    if crossed is not None:
-        return crossed, f"the two ends of the range cross at {second} = {crossed:.7g}", True, False
+    if reach != start and not (len(followed) == 2 and followed[0].curve is followed[1].curve):
+        values = np.linspace(start, reach, 400)[:-1]
+        crossed = values[across(ends[0], values) > across(ends[1], values)]
+        if len(crossed):
+            place = float(crossed[0])
+            return place, f"the two ends of the range cross at {second} = {place:.7g}", True, False
     if abs(reach - bound) <= slack:
         return bound, f"{second} = {bound:.7g}, the end of the bounds", False, True
     stops = [end for end, edge in edges.items() if abs(edge - reach) <= slack]
@@ -301,18 +288,6 @@ def _reached(
     border = stops[0]
     ending = "turns back" if border.end(upper) is not None else f"ends ({border.curve.ended})"
     return reach, f"the curve of one end {ending} at {second} = {reach:.7g}: what is beyond is not known", False, False
-
-
-def _crossing(start: float, reach: float, ends: Sequence[MonotonePiece | float], upper: bool) -> float | None:
-    """The value of s nearest to `start` at which the lower end rises above the upper one, None if it does not."""
-    low, high = ends
-    if reach == start or (
-        isinstance(low, MonotonePiece) and isinstance(high, MonotonePiece) and low.curve is high.curve
-    ):
-        return None
-    values = np.linspace(start, reach, 400)[:-1]
-    crossed = np.nonzero(across(low, values) > across(high, values))[0]
-    return float(values[crossed[0]]) if len(crossed) else None
 
 
 @dataclass(frozen=True)
@@ -373,7 +348,7 @@ class IsolaRegion:
 
 
 @dataclass(eq=False, repr=False)
-class IsolaMap(Stored):
+class IsolaMap(PlaneMap):
     """In which regions of two design parameters isolas exist.
 
     Attributes
@@ -435,17 +410,13 @@ class IsolaMap(Stored):
         InputError
             Outside the bounds, and where a curve ends before it, so that nothing is known.
         """
-        low, high = self.bounds
-        if not is_number(value) or not low <= value <= high:
-            raise InputError(f"the map reaches from {self.second} = {low:g} to {high:g}, not to {value!r}")
+        self._check_reach(self.second, value, self.bounds)
         ranges = []
         for region in self.regions:
             span = region.span
             if span.contains(value):
                 ranges.append(span.range(value))
-                continue
-            above = value > span.high
-            if not span.settled[above]:
+            elif not span.settled[above := value > span.high]:
                 raise InputError(f"at {self.second} = {value:g} nothing is known: {span.reasons[above]}")
         return sorted(ranges)
 
@@ -482,10 +453,6 @@ class IsolaMap(Stored):
         own = ("region", "end", "border")
         names = (*own, *(parameter_column(name, own) for name in (self.second, self.parameter)))
         return Table.of_rows(names, rows, f"isolas over {self.second} and {self.parameter}")
-
-    def to_dataframe(self) -> pandas.DataFrame:
-        """`to_table` as a table of pandas."""
-        return self.to_table().to_dataframe()
 
     def plot(self, path: str | Path | None = None, **options: Any) -> Any:
         """The regions in the plane of both parameters, curves of birth and merging named.

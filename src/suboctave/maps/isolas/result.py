@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import InitVar, dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
@@ -121,15 +121,12 @@ class Isola:
     @property
     def born(self) -> IsolaEnd | None:
         """Where the closed branch shrinks to a point; None where the bounds cut that off."""
-        return self._end("isola_centre")
+        return next((end for end in self.ends if end is not None and end.kind == "isola_centre"), None)
 
     @property
     def merges(self) -> IsolaEnd | None:
         """Where it joins another branch; None where the bounds cut that off, or where there is no such place."""
-        return self._end("isola_merging")
-
-    def _end(self, kind: str) -> IsolaEnd | None:
-        return next((end for end in self.ends if end is not None and end.kind == kind), None)
+        return next((end for end in self.ends if end is not None and end.kind == "isola_merging"), None)
 
     def __contains__(self, value: float) -> bool:
         return self.range[0] <= value <= self.range[1]
@@ -186,18 +183,13 @@ class Isola:
         """
         from suboctave.pictures import plot_space
 
-        drawn = replace(self, followed={value: self.at(value) for value in self._places(values)})
+        places, (low, high) = checked_values("values", values, self.range), self.range
+        if isinstance(places, int):
+            places = np.linspace(low + 0.02 * (high - low), high - 0.08 * (high - low), places).tolist()
+        drawn = replace(self, followed={value: self.at(value) for value in places})
         alone = Isolas([drawn], self.system, self.parameter, self.range, self.omega, [self.limit_points, *self.further])
         given = list(responses) if isinstance(responses, list | tuple) else [responses]
         return plot_space([*alone.to_xarray().values(), *given], path, **options)
-
-    def _places(self, values: Any) -> list[float]:
-        """Values of the parameter at which closed branches are wanted, within the range; InputError otherwise."""
-        places, (low, high) = checked_values("values", values, self.range), self.range
-        if not isinstance(places, int):
-            return places
-        first, last = low + 0.02 * (high - low), high - 0.08 * (high - low)
-        return [float(v) for v in np.linspace(first, last, places)]
 
     def __repr__(self) -> str:
         low, high = self.range
@@ -241,10 +233,8 @@ def _joined(chain: Sequence[MonotonePiece], bounds: tuple[float, float]) -> Trac
     first, last = (points[0].arclength, points[-1].arclength) if points else (0.0, 0.0)
     met = [e for e in curve.bifurcations.met if id(e.orbit) in orbits or first < e.arclength < last]
     ending = Ending(EndReason.CUT, detail=f"cut to {chain[0].along} from {low:.7g} to {high:.7g}")
-    endings, options = (ending, ending), curve.options
-    return TrackedBranch(
-        curve.kind, curve.names, curve.system, curve.name, points, met, [], False, endings, curve.observe, options
-    )
+    own: tuple[Any, ...] = points, met, [], False, (ending, ending), curve.observe, curve.options
+    return TrackedBranch(curve.kind, curve.names, curve.system, curve.name, *own)
 
 
 @dataclass(eq=False, repr=False)
@@ -292,9 +282,6 @@ class Isolas(Stored, Sequence[Isola]):
     def __getitem__(self, which: int | slice) -> Isola | tuple[Isola, ...]:
         return self._items[which]
 
-    def __iter__(self) -> Iterator[Isola]:
-        return iter(self._items)
-
     @limited
     def at(self, value: float, *, seconds: float | None = None) -> list[Branch]:
         """The closed branches that exist at a value of the parameter; `seconds`: time limit of all of them."""
@@ -333,6 +320,8 @@ class Isolas(Stored, Sequence[Isola]):
 
         Curves of limit points come before those of period doublings; the column `curve` numbers them.
         """
+        import pandas
+
         known = ("isolas", "points", "bifurcations")
         if what not in known:
             raise InputError(f"to_csv writes isolas, points or bifurcations, not {what!r}{suggest(str(what), known)}")
@@ -342,21 +331,17 @@ class Isolas(Stored, Sequence[Isola]):
             return write_csv(self.to_dataframe().assign(**more), path, overwrite)
         points = what == "points"
         frames = [curve.to_dataframe() if points else curve.bifurcations_frame() for curve in self._curves]
-        return write_csv(self._joined(frames), path, overwrite)
-
-    @property
-    def _curves(self) -> tuple[TrackedBranch, ...]:
-        return (*self.limit_points, *self.doublings)
-
-    def _joined(self, frames: Sequence[pandas.DataFrame]) -> pandas.DataFrame:
-        import pandas
-
         full = [
             led_by(frame, {"curve": number, "of": curve.kind, "nu": curve.nu})
             for number, (curve, frame) in enumerate(zip(self._curves, frames, strict=True))
             if len(frame)
         ]
-        return pandas.concat(full, ignore_index=True) if full else pandas.DataFrame({"curve": []})
+        frame = pandas.concat(full, ignore_index=True) if full else pandas.DataFrame({"curve": []})
+        return write_csv(frame, path, overwrite)
+
+    @property
+    def _curves(self) -> tuple[TrackedBranch, ...]:
+        return (*self.limit_points, *self.doublings)
 
     def to_xarray(self, readings: Iterable[str] | bool = False) -> dict[str, xarray.Dataset]:
         """Datasets by name: "isolas" (one entry each, and their edges), all curves, the closed branches known.

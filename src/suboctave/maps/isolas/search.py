@@ -1,4 +1,15 @@
-"""The search for isolas: limit points that no branch explains lead to closed branches, these to ranges of existence.
+"""`find_isolas`: closed branches that no sweep leads to, over a design parameter.
+
+1. At several values of the parameter the response is followed, with the branches that bifurcate from it
+   (`_from_responses`; where that leads to no isola, responses under other loads and resonances).
+2. Every limit point met is followed over the parameter, through its extrema; every period doubling as well.
+3. Where the curve of limit points has a definite extremum a closed branch shrinks to a point. Limit points at the
+   values of 1. that lie on none of the branches met there lie on others.
+4. A branch through such a limit point is followed. If it closes, the search finds the range in which it does.
+
+None of this depends on the value that the parameter happens to have, nor begins at an extremum of period doublings,
+where sub-harmonic motions appear beside their parent (Alcorta et al., Nonlinear Dynamics 98, 2019, section 3.6, begin
+there).
 
 As the design parameter q changes, a closed branch can change its nature only where one of its limit points meets
 another (an extremum of q along their curve, or a cusp) or, for sub-harmonic motions, where period doublings of the
@@ -12,17 +23,33 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
+from typing import Any, Unpack
 
+import numpy as np
+
+from suboctave.analysis.branches import continue_branch
+from suboctave.analysis.diagram import Followed
+from suboctave.analysis.options import SearchOptions
+from suboctave.analysis.subharmonics import Seeds, check_seeds
 from suboctave.bifurcation.bifurcation import TrackedEvent
-from suboctave.errors import ConvergenceError
+from suboctave.curves.discretisation import Harmonics, own_linear_part
+from suboctave.curves.identity import image_of, lies_on, relation
+from suboctave.curves.junction import period_name
+from suboctave.errors import ConvergenceError, InputError, is_number
+from suboctave.harmonic.evaluation import HarmonicBalance
+from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.interruption import pass_on
-from suboctave.maps.catalogue import Catalogue, branch_through
-from suboctave.maps.isolas.result import Isola, IsolaEnd
+from suboctave.maps.catalogue import Catalogue, branch_through, checked_orders, checked_values, listed, motion_near
+from suboctave.maps.isolas.result import Isola, IsolaEnd, Isolas
 from suboctave.maps.pieces import MonotonePiece
+from suboctave.model.inputs import check_count, timed
+from suboctave.model.system import System
+from suboctave.options import with_options
 from suboctave.results.branch import Branch
 
 #: share of the work that the responses make, for progress
-PREPARATION = 0.6
+_PREPARATION = 0.6
 #: events that are closer, in units of the parameter's range, are met together
 _TOGETHER = 1e-7
 #: halvings of the interval in which a branch ceases to be detached for no known reason
@@ -87,7 +114,7 @@ class Search:
             return
         if loop.detached and loop.pieces:
             catalogue, value = self.catalogue, loop.value
-            catalogue.progress(PREPARATION, f"closed branch at {catalogue.name} = {value:.6g}")
+            catalogue.progress(_PREPARATION, f"closed branch at {catalogue.name} = {value:.6g}")
             # to begin with at a single value
             reasons = ("not followed to lower values", "not followed to higher values")
             isola = Isola(
@@ -125,6 +152,22 @@ class Search:
                 unexplained = piece.contains(value) and (value, piece) not in self._explained
                 if unexplained and not any(_covers(isola, piece, value) for isola in self.isolas):
                     yield piece, value
+
+    def result(self) -> Isolas:
+        """The isolas and the curves that were followed, with the outcome in one sentence."""
+        catalogue, isolas = self.catalogue, self.isolas
+        (low, high), (first, last) = catalogue.bounds, catalogue.omega
+        limit_points, doublings = ([c for c in catalogue.curves if c.kind == kind] for kind in ("LP", "PD"))
+        where = f"for {catalogue.name} from {low:g} to {high:g}, omega from {first:g} to {last:g}"
+        begun = f"the responses at {len(self.values)} values of {catalogue.name}"
+        followed = f"{len(limit_points)} curves of limit points from {begun}"
+        if isolas:
+            summary = f"{len(isolas)} isola{'s' * (len(isolas) > 1)} {where}; {followed}."
+        else:
+            periods = " and ".join(period_name(nu) for nu in sorted({p.nu for p in catalogue.limit_points} | {1}))
+            summary = f"No isola of {periods} motions was found {where}: {followed} show none."
+        asked = catalogue.system, catalogue.name, catalogue.bounds, (first, last)
+        return Isolas(isolas, *asked, limit_points, doublings, catalogue.notes, summary, catalogue.interruption)
 
     # ------------------------------------------------------------------------------------- branches at one value
     def through(self, piece: MonotonePiece, value: float) -> Loop | None:
@@ -178,16 +221,6 @@ class Search:
 
 
 # ---------------------------------------------------------------------------------------------- ranges of existence
-@dataclass(frozen=True)
-class _End:
-    """How a detached branch ends in one direction: where, why, by which event, and whether it shrinks to a point."""
-
-    value: float
-    reason: str
-    event: TrackedEvent | None = None
-    centre: bool = False
-
-
 class _Direction:
     """A detached branch over rising (`upper`) or falling values of the parameter."""
 
@@ -200,60 +233,83 @@ class _Direction:
         self.bound = search.catalogue.bounds[1 if upper else 0]
 
     def settle(self, loop: Loop) -> None:
-        """Find the end of the range in this direction, from a branch within it."""
-        isola, end = self.isola, self._end(loop)
-        event = None if end.event is None else IsolaEnd.of(end.event, self.name, end.centre)
-        (low, high), (first, last), (why, reason) = isola.range, isola.ends, isola.reasons
-        isola.range = (low, end.value) if self.upper else (end.value, high)
-        isola.ends = (first, event) if self.upper else (event, last)
-        isola.reasons = (why, end.reason) if self.upper else (end.reason, reason)
+        """Go on from a branch within the range until it vanishes, meets another one, or the range ends."""
+        ahead: Loop | None = loop
+        while ahead is not None and (step := next(self._relevant(ahead), None)) is not None:
+            ahead = self._behind(ahead, *step)
+        if ahead is not None:
+            self._cut(ahead)
 
-    def _take(self, loop: Loop) -> None:
+    def _end(self, value: float, reason: str, event: TrackedEvent | None = None, centre: bool = False) -> None:
+        """The range ends there: why, by which event, whether it shrinks to a point."""
+        isola, place = self.isola, None if event is None else IsolaEnd.of(event, self.name, centre)
+        (low, high), (first, last), (why, reasons) = isola.range, isola.ends, isola.reasons
+        isola.range = (low, value) if self.upper else (value, high)
+        isola.ends = (first, place) if self.upper else (place, last)
+        isola.reasons = (why, reason) if self.upper else (reason, reasons)
+
+    def _take(self, loop: Loop) -> Loop:
         """The branch at another value, detached as well."""
         self.isola.followed[loop.value] = loop.branch
         self.isola.pieces = tuple(dict.fromkeys([*self.isola.pieces, *loop.pieces]))
+        return loop
 
-    def _end(self, loop: Loop) -> _End:
-        """Go on until the branch vanishes, meets another one, or the range ends."""
-        while (step := next(self._relevant(loop), None)) is not None:
-            after = self._behind(loop, *step)
-            if isinstance(after, _End):
-                return after
-            self._take(after)
-            loop = after
-        last = [piece for piece in loop.pieces if piece.contains(self.bound)]
+    def _cut(self, loop: Loop) -> None:
+        """Behind the last event there is nothing but the bound."""
+        name, bound = self.name, self.bound
+        last = [piece for piece in loop.pieces if piece.contains(bound)]
         if not last:
             reach = (max if self.upper else min)(p.high if self.upper else p.low for p in loop.pieces)
-            return _End(reach, f"from {self.name} = {reach:.9g} on its limit points could not be followed")
-        cut = _End(self.bound, f"{self.name} = {self.bound:.9g}, the end of the bounds, cuts its range")
-        if loop.value == self.bound:
-            return cut
-        at_bound = self.search.through(last[0], self.bound)
+            return self._end(reach, f"from {name} = {reach:.9g} on its limit points could not be followed")
+        at_bound = loop if loop.value == bound else self.search.through(last[0], bound)
         if at_bound is None:
-            return _End(loop.value, f"behind {self.name} = {loop.value:.9g} it could not be followed")
-        if at_bound.detached:
+            return self._end(loop.value, f"behind {name} = {loop.value:.9g} it could not be followed")
+        if not at_bound.detached:
+            return self._bisect(last[0], loop, at_bound)
+        if at_bound is not loop:
             self._take(at_bound)
-            return cut
-        return self._bisected(last[0], loop, at_bound)
+        return self._end(bound, f"{name} = {bound:.9g}, the end of the bounds, cuts its range")
 
-    def _behind(self, loop: Loop, value: float, events: list[TrackedEvent]) -> Loop | _End:
-        """The detached branch behind events at a value, or how it ends there."""
+    def _behind(self, loop: Loop, value: float, events: list[TrackedEvent]) -> Loop | None:
+        """The detached branch behind events at a value; None where it ends there."""
         ends = {piece: piece.end(self.upper) for piece in loop.pieces}
         own = [e for e in events if any(end is e for end in ends.values())]
+        met = own or events
         lasting = [p for p, end in ends.items() if not any(end is e for e in own) and p.contains(value)]
         if not lasting:
-            return _vanishing(value, own or events, self.name)
-        behind = 0.5 * (value + self._next(loop, value))
+            self._vanish(value, met)
+            return None
+        # half way to the next event of any kind, or to the bound
+        beyond, _ = next(self.search.critical(loop.pieces[0].nu, value, self.upper), (self.bound, []))
+        behind = 0.5 * (value + beyond)
         after = self.search.through(lasting[0], behind)
         if after is None:
-            return _End(value, f"at {self.name} = {value:.9g} it could not be followed further")
-        event = _reconnecting(own or events)
+            self._end(value, f"at {self.name} = {value:.9g} it could not be followed further")
+            return None
+        event = _reconnecting(met)
         if not after.detached:
             if event is None or not (own or self._detached_before(value, lasting[0], loop)):
-                return self._bisected(lasting[0], loop, after)
-            return _End(value, _merging(self.name, value, event, after), event)
+                self._bisect(lasting[0], loop, after)
+                return None
+            self._end(value, _merging(self.name, value, event, after), event)
+            return None
         other = next((o for o in self.others if any(_covers(o, piece, behind) for piece in after.pieces)), None)
-        return after if other is None else _End(value, _joining(self.name, value, own or events, other), event)
+        if other is None:
+            return self._take(after)
+        place = ", ".join(
+            f"{self.name} = {float(e):.7g}" for e in other.ends if e is not None and e.kind == "isola_centre"
+        )
+        which = f"the isola born at {place}" if place else "another isola"
+        where = f"omega = {met[0].omega:.9g}, {self.name} = {value:.9g}"
+        self._end(value, f"merges at {where} with {which}, as which it goes on", event)
+        return None
+
+    def _vanish(self, value: float, events: list[TrackedEvent]) -> None:
+        for event in events:
+            if event.kind == "extremum" and event.isola != "isola_merging":
+                where = f"omega = {event.omega:.9g}, {self.name} = {value:.9g}"
+                return self._end(value, f"shrinks to a point (isola centre) at {where}", event, True)
+        return self._end(value, f"its last limit points vanish in a {events[0].kind} at {self.name} = {value:.9g}")
 
     def _detached_before(self, value: float, piece: MonotonePiece, loop: Loop) -> bool:
         """Whether a branch is detached until just before an event that is none of its own limit points."""
@@ -270,11 +326,7 @@ class _Direction:
             if own or any(e.isola == "isola_merging" or e.curve == "PD" for e in events):
                 yield value, events
 
-    def _next(self, loop: Loop, value: float) -> float:
-        """The value of the next event of any kind behind another, or the bound."""
-        return next(self.search.critical(loop.pieces[0].nu, value, self.upper), (self.bound, []))[0]
-
-    def _bisected(self, piece: MonotonePiece, inside: Loop, outside: Loop) -> _End:
+    def _bisect(self, piece: MonotonePiece, inside: Loop, outside: Loop) -> None:
         """Where a branch ceases to be detached though no event that is known explains it."""
         a, b = inside.value, outside.value
         for _ in range(_BISECTIONS):
@@ -289,7 +341,7 @@ class _Direction:
         low, high = sorted((a, b))
         where = f"between {self.name} = {low:.6g} and {high:.6g}"
         self.isola.notes += (f"{where} it ceases to be detached, and no event that was found says why",)
-        return _End(a, f"detached up to {self.name} = {a:.6g} at least, no longer at {b:.6g}")
+        self._end(a, f"detached up to {self.name} = {a:.6g} at least, no longer at {b:.6g}")
 
 
 def _covers(isola: Isola, piece: MonotonePiece, value: float) -> bool:
@@ -305,15 +357,6 @@ def _reconnecting(events: list[TrackedEvent]) -> TrackedEvent | None:
     return None
 
 
-def _vanishing(value: float, events: list[TrackedEvent], name: str) -> _End:
-    for event in events:
-        if event.kind == "extremum" and event.isola != "isola_merging":
-            where = f"omega = {event.omega:.9g}, {name} = {value:.9g}"
-            return _End(value, f"shrinks to a point (isola centre) at {where}", event, True)
-    (event, *_) = events
-    return _End(value, f"its last limit points vanish in a {event.kind} at {name} = {value:.9g}")
-
-
 def _merging(name: str, value: float, event: TrackedEvent, after: Loop) -> str:
     where = f"omega = {event.omega:.9g}, {name} = {value:.9g}"
     met = [str(j) for j in (after.branch.departs, after.branch.arrives) if j is not None]
@@ -323,7 +366,218 @@ def _merging(name: str, value: float, event: TrackedEvent, after: Loop) -> str:
     return f"merges at {where} with {what}"
 
 
-def _joining(name: str, value: float, events: list[TrackedEvent], other: Isola) -> str:
-    place = ", ".join(f"{name} = {float(e):.7g}" for e in other.ends if e is not None and e.kind == "isola_centre")
-    which = f"the isola born at {place}" if place else "another isola"
-    return f"merges at omega = {events[0].omega:.9g}, {name} = {value:.9g} with {which}, as which it goes on"
+# ------------------------------------------------------------------------------------------------------------ the verb
+@with_options(SearchOptions)
+@timed
+def find_isolas(
+    system: System,
+    omega: tuple[float, float],
+    parameter: str,
+    bounds: tuple[float, float],
+    harmonics: Harmonics = "adaptive",
+    *,
+    values: int | Sequence[float] = 5,
+    depth: int = 1,
+    levels: Sequence[float] | None = None,
+    search: Sequence[int] | None = None,
+    seeds: Seeds | None = None,
+    max_curves: int = 64,
+    **options: Unpack[SearchOptions],
+) -> Isolas:
+    """Isolated responses over a design parameter: where each is born, where it merges, the closed branch in between.
+
+    Parameters
+    ----------
+    system
+        What vibrates. The value that `parameter` has in it does not matter.
+    omega
+        Range of frequencies in which responses are followed, rad per unit time; the order is irrelevant.
+    parameter, bounds
+        The design parameter and its range; the order is irrelevant.
+    harmonics
+        As in `frequency_response`.
+    values
+        At how many values of the parameter, evenly spread over the bounds, responses are followed to begin with (at
+        least 2); or these values themselves.
+    depth
+        How many bifurcations deep branches are followed there: 0 the response alone, 1 with what leaves it (2T), 2 with
+        what leaves these (4T). Isolas of those periods are found.
+    levels
+        Other levels of the loads, in units of their own, at which responses are followed at these values as well: most
+        isolas join the main branch under stronger loads. Default: where no isola was found otherwise some between
+        1.5 and 5, at three of the values, until one is found; () for never.
+    search
+        Periods (2 for 2T, 3 for 3T, ...) of which isolas are looked for at these values among the nonlinear resonances
+        of the linear modes as well (`find_subharmonics`). Default: 2 where no isola was found otherwise, at three
+        of the values; () for never.
+    seeds
+        How finely that is done.
+    max_curves
+        Curves of bifurcations after which no more are followed.
+
+    Returns
+    -------
+    Isolas
+        A sequence of `Isola`, in the order of the values at which they are born; `notes` says what could not be
+        settled, `limit_points` and `doublings` are the curves that were followed. Ctrl-C ends it with what was found.
+
+    Notes
+    -----
+    An isola is met if one of its limit points, followed over the parameter, leads to a branch that bifurcates from the
+    response at one of `values`, or if the search meets it. One that does so nowhere within the bounds may be missed:
+    widen the bounds, or search for its period.
+    """
+    catalogue = Catalogue.checked(system, parameter, bounds, omega, harmonics, max_curves, options)
+    search_at = checked_values("values", values, catalogue.bounds, least=2)
+    if isinstance(search_at, int):
+        search_at = np.linspace(*catalogue.bounds, search_at).tolist()
+    check_count("depth", depth, 0)
+    other_levels, fine = checked_levels(levels), check_seeds(seeds)
+    orders = None if search is None else checked_orders(search, 2)
+    state = Search(catalogue, sorted(set(search_at)))
+    with catalogue.reporting(options.get("progress"), f"isolas over {parameter}"):
+        _from_responses(state, depth)
+        _from_load_levels(state, other_levels, depth)
+        _from_resonances(state, orders, fine)
+    return state.result()
+
+
+def checked_levels(levels: Any) -> tuple[float, ...] | None:
+    """Levels of the loads at which responses are followed besides; None where the search chooses."""
+    if levels is None:
+        return None
+    given = listed(levels)
+    if not all(is_number(level) and level > 0.0 for level in given):
+        raise InputError(f"levels must be positive numbers, those of the loads in units of their own, not {levels!r}")
+    if any(level == 1.0 for level in given):
+        raise InputError(
+            "levels are other ones than 1, that of the loads themselves: responses there are followed anyway"
+        )
+    return tuple(float(level) for level in given)
+
+
+#: levels of the loads, and periods of motions, that are tried where nothing else leads to an isola
+_LEVELS, _ORDERS = (1.5, 2.2, 3.2, 4.7), (2,)
+#: motions of a branch whose mirror images lead to another one, if there is any
+_IMAGES = 12
+#: name of the parameter that scales all loads
+_LEVEL = "load_level"
+
+
+def _from_responses(search: Search, depth: int) -> None:
+    """Responses at all values, with what bifurcates from them so many bifurcations deep."""
+    catalogue = search.catalogue
+    for number, value in enumerate(search.values):
+        catalogue.progress(_PREPARATION * number / len(search.values), f"{catalogue.name} = {value:.6g}")
+        for branch in _responses(catalogue, value, depth):
+            search.attach(Loop(value, branch, search.pieces_on(branch, value), False))
+    catalogue.progress(_PREPARATION, "closed branches")
+    search.settle(search.values)
+
+
+def _responses(catalogue: Catalogue, value: float, depth: int) -> Iterator[Branch]:
+    """Branches at a value that a response leads to, their period doublings followed over the parameter."""
+    for diagram in catalogue.responses(value, catalogue.omega, Followed(depth)):
+        met = [(node.branch, node.depth < depth) for node in diagram]
+        images = ((branch, depth > 0) for branch in _images(diagram.branches, catalogue, value))
+        for branch, doubles in chain(met, images):
+            for item in branch.bifurcations["PD"] if doubles else ():
+                catalogue.known(item, value)
+            yield branch
+
+
+def _images(branches: list[Branch], catalogue: Catalogue, value: float) -> Iterator[Branch]:
+    """Branches through motions beside the mirror images of others.
+
+    What would be two halves of a loop between pitchforks, were the system symmetric, is taken apart by a small load
+    that is not: the response runs over one half, and the other is reached from its image.
+    """
+    low, high = catalogue.omega
+    known = list(branches)
+    for branch in branches:
+        for place in np.linspace(0, len(branch) - 1, min(_IMAGES, len(branch))).round().astype(int):
+            orbit = branch.orbits[place]
+            image = image_of(orbit)
+            if not low <= orbit.omega <= high or relation(orbit, image).one:
+                continue
+            try:
+                motion = motion_near(image, catalogue.at(value), orbit.omega)
+                if any(lies_on(motion, other.points, images=True) for other in known):
+                    continue
+                known.append(continue_branch(motion, "omega", catalogue.omega, **catalogue.options))
+            except ConvergenceError:
+                continue
+            pass_on(known[-1].interruption)
+            yield known[-1]
+
+
+def _from_load_levels(search: Search, levels: Sequence[float] | None, depth: int) -> None:
+    """Responses at other levels of all loads together, in units of their own: most isolas join the main branch there.
+
+    Limit points met there are followed over the level to the loads' own one, where they lie on branches of the system
+    itself. Without levels some, as long as no isola is known, and at few values.
+    """
+    catalogue = search.catalogue
+    for level in _LEVELS if levels is None else levels:
+        if levels is None and search.isolas:
+            break
+        for value in search.few if levels is None else search.values:
+            catalogue.progress(_PREPARATION, f"{level:g} times the loads at {catalogue.name} = {value:.6g}")
+            for branch in _under_other_loads(search, value, level, depth):
+                search.meet(branch, value)
+
+
+def _under_other_loads(search: Search, value: float, level: float, depth: int) -> Iterator[Branch]:
+    """Branches at a value that a level of the loads leads to and the search has not met, each once.
+
+    Where nothing oscillates but elements there are none.
+    """
+    catalogue = search.catalogue
+    system = catalogue.at(value)
+    if not any(c.harmonic for c in system.load_components()):
+        return
+    bounds = (min(1.0, level), max(1.0, level))
+    scaled = system.with_scaled_loads(_LEVEL)
+    other = Catalogue(scaled, _LEVEL, bounds, catalogue.omega, catalogue.harmonics, catalogue.options, catalogue.most)
+    try:
+        for branch in _responses(other, level, depth):
+            for item in branch.bifurcations["LP"]:
+                other.known(item, level)
+    finally:
+        for note in other.notes:
+            catalogue.note(f"at {catalogue.name} = {value:.6g}, looking at {level:g} times the loads: {note}")
+    known = list(search.met.get(value, []))
+    for piece in other.limit_points:
+        if not piece.contains(1.0):
+            continue
+        with catalogue.noting(f"at {catalogue.name} = {value:.6g}, a limit point from stronger loads"):
+            orbit = _unscaled(piece.solve_at(1.0).orbit, system)
+            if any(lies_on(orbit, branch.points, images=True) for branch in known):
+                continue
+            bounds = (min(catalogue.omega.low, orbit.omega), max(catalogue.omega.high, orbit.omega))
+            known.append(continue_branch(orbit, "omega", bounds, **catalogue.options))
+            yield known[-1]
+
+
+def _unscaled(orbit: PeriodicOrbit, system: System) -> PeriodicOrbit:
+    """A motion of the system with scaled loads, at their own level, as one of the system itself."""
+    values = {name: value for name, value in orbit.values.items() if name != _LEVEL}
+    balance = HarmonicBalance(system, orbit.basis, linear=own_linear_part(orbit))
+    balance = balance.settle(orbit.coefficients, orbit.omega)
+    return PeriodicOrbit(
+        balance, orbit.coefficients, orbit.omega, values, orbit.residual, orbit.truncation, orbit.adaptive
+    )
+
+
+def _from_resonances(search: Search, orders: Sequence[int] | None, seeds: Seeds | None) -> None:
+    """Motions of some periods near nonlinear resonances of the linear modes (`find_subharmonics`).
+
+    Without periods those of 2T, where no isola is known, at few values.
+    """
+    if orders is None and search.isolas:
+        return
+    for value in search.few if orders is None else search.values:
+        for order in _ORDERS if orders is None else orders:
+            known = [branch for branch in search.met.get(value, []) if branch.nu == order]
+            for branch in search.catalogue.resonant(value, order, seeds, known, _PREPARATION):
+                search.meet(branch, value)

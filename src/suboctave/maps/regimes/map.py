@@ -11,10 +11,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -24,24 +24,21 @@ from suboctave.continuation.problem import Array
 from suboctave.curves.discretisation import make_curve
 from suboctave.curves.identity import apart
 from suboctave.curves.junction import period_name
+from suboctave.curves.points import BranchPoint
 from suboctave.curves.starts import linear_response
-from suboctave.errors import ConvergenceError, InputError, is_number
+from suboctave.errors import ConvergenceError
 from suboctave.experiments.poincare import Attractor, poincare_sections
 from suboctave.floquet.monodromy import floquet_multipliers
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.interruption import limited, pass_on
-from suboctave.maps.catalogue import Catalogue, motion_near
-from suboctave.maps.regimes.slices import Arc, Regime, Strip, regime_of
+from suboctave.maps.catalogue import Catalogue, PlaneMap, motion_near
+from suboctave.maps.pieces import MonotonePiece, across
 from suboctave.model.inputs import check_count
 from suboctave.model.system import System
 from suboctave.progress import reporting
-from suboctave.results.branch import TrackedBranch
+from suboctave.results.branch import Branch, TrackedBranch
 from suboctave.store.layout import parameter_column
-from suboctave.store.registry import Stored
 from suboctave.store.table import Table
-
-if TYPE_CHECKING:
-    import pandas
 
 #: steps of the way, shares of it: the first, the smallest
 _FIRST, _SMALLEST = 0.5, 1e-3
@@ -49,6 +46,134 @@ _FIRST, _SMALLEST = 0.5, 1e-3
 _MOST = 0.35
 #: and keeps this share of what a motion of a shorter period has not: else it fell back onto that
 _LASTING = 0.3
+
+
+@dataclass(frozen=True, eq=False)
+class Edge:
+    """What ends a stable arc: a border that can be followed, or a frequency that stays as it is.
+
+    `bound` where the range of omega ends it; `kind` of the bifurcation, empty where there is none.
+    """
+
+    omega: float
+    border: MonotonePiece | None = None
+    kind: str = ""
+    bound: bool = False
+
+    def across(self, values: Array | float) -> Array:
+        """The frequency at values of the design parameter; nan where the border does not reach."""
+        return across(self.omega if self.border is None else self.border, values)
+
+
+@dataclass(frozen=True, eq=False)
+class Arc:
+    """A stable stretch of a branch at one value of the design parameter: `nu`, whether it lies on an isola, two edges.
+
+    The edges are in ascending order of omega; `points` are its motions. With `followed` False it stands for what leaves
+    the deepest branches at period doublings: `nu` is the period of the first such motions, `points` are those of the
+    branch that they leave, which is unstable there by one multiplier below -1.
+    """
+
+    nu: int
+    isolated: bool
+    edges: tuple[Edge, Edge]
+    points: tuple[BranchPoint, ...]
+    followed: bool = True
+
+    @property
+    def nearly_doubled(self) -> float:
+        """How close a multiplier comes to -1 within the arc and turns back; infinite where none does.
+
+        Where that vanishes, as the parameter changes, a pair of period doublings appears. Of motions of the load's
+        period only real multipliers count: a pair passes -1 at some distance wherever omega is twice a frequency of
+        the structure.
+        """
+        gaps = []
+        for point in self.points:
+            mu = point.floquet.multipliers
+            if self.nu == 1:
+                mu = mu[np.abs(mu.imag) <= 1e-9 * np.abs(mu)]
+            gaps.append(float(np.abs(mu + 1.0).min(initial=np.inf)))
+        inner = [b for a, b, c in zip(gaps, gaps[1:], gaps[2:], strict=False) if b <= a and b <= c]
+        return min(inner, default=np.inf)
+
+    def range(self, values: Array | float) -> tuple[Array, Array]:
+        """Between which frequencies it has a motion, at values of the design parameter."""
+        low, high = (edge.across(values) for edge in self.edges)
+        return low, high
+
+
+@dataclass(eq=False)
+class Slice:
+    """Branches over omega at one value of the design parameter, and their stable arcs.
+
+    Of each branch whether it lies on an isola, or leaves one.
+    """
+
+    value: float
+    branches: list[tuple[Branch, bool]] = field(default_factory=list)
+    arcs: list[Arc] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Regime:
+    """The stable motions that coexist: of each its period in periods of the load, and whether it lies on an isola.
+
+    `beyond`: the same of what leaves the deepest branches at period doublings, with the period of the first such
+    motions. It was not followed: it may double again, or be chaotic.
+    """
+
+    motions: tuple[tuple[int, bool], ...] = ()
+    beyond: tuple[tuple[int, bool], ...] = ()
+
+    @property
+    def count(self) -> int:
+        """How many stable motions are known; two that differ by a shift in time only are one, mirror images two."""
+        return len(self.motions)
+
+    @property
+    def periods(self) -> tuple[int, ...]:
+        """Their periods in periods of the load, ascending, one for each motion."""
+        return tuple(nu for nu, _ in self.motions)
+
+    @property
+    def isolated(self) -> bool:
+        """Whether one of them lies on an isola."""
+        return any(isolated for _, isolated in (*self.motions, *self.beyond))
+
+    def __str__(self) -> str:
+        parts = []
+        for group, words in ((self.motions, ""), (self.beyond, " or more")):
+            for (nu, isolated), number in sorted(Counter(group).items()):
+                name = f"{period_name(nu)}{words}{' on an isola' if isolated else ''}"
+                parts.append(name if number == 1 else f"{number} x {name}")
+        return " + ".join(parts) or "no stable motion known"
+
+
+@dataclass(frozen=True, eq=False)
+class Strip:
+    """Values of the parameter from `low` to `high`, the slice that stands for them, and whether it lies within."""
+
+    low: float
+    high: float
+    slice: Slice | None
+    examined: bool
+
+    @property
+    def arcs(self) -> list[Arc]:
+        """The stable arcs."""
+        return [] if self.slice is None else self.slice.arcs
+
+    @property
+    def value(self) -> float:
+        """The value of the parameter at which branches were followed."""
+        return 0.5 * (self.low + self.high) if self.slice is None else self.slice.value
+
+
+def regime_of(arcs: Sequence[Arc]) -> Regime:
+    """The label of motions that coexist."""
+    known, beyond = ([(a.nu, a.isolated) for a in arcs if a.followed is followed] for followed in (True, False))
+    return Regime(tuple(sorted(known)), tuple(sorted(beyond)))
 
 
 @dataclass(frozen=True)
@@ -61,7 +186,7 @@ class Region:
     values: tuple[float, float]
 
 
-class RegimeMap(Stored):
+class RegimeMap(PlaneMap):
     """Which stable motions exist over omega and a design parameter.
 
     Attributes
@@ -95,16 +220,12 @@ class RegimeMap(Stored):
 
     def strip(self, value: float) -> Strip:
         """The strip that a value of the parameter lies in; InputError outside the bounds."""
-        low, high = self.bounds
-        if not is_number(value) or not low <= value <= high:
-            raise InputError(f"the map reaches from {self.parameter} = {low:g} to {high:g}, not to {value!r}")
+        self._check_reach(self.parameter, value, self.bounds)
         return next(s for s in self.strips if value <= s.high or s is self.strips[-1])
 
     def arcs(self, omega: float, value: float) -> list[Arc]:
         """The stable arcs that have a motion at a point of the plane; InputError outside the map."""
-        low, high = self.omega
-        if not is_number(omega) or not low <= omega <= high:
-            raise InputError(f"the map reaches from omega = {low:g} to {high:g}, not to {omega!r}")
+        self._check_reach("omega", omega, self.omega)
         ranges = ((arc, *arc.range(value)) for arc in self.strip(value).arcs)
         return [arc for arc, first, last in ranges if first <= omega <= last]
 
@@ -243,9 +364,9 @@ class RegimeMap(Stored):
         regions = []
         for number, regime in enumerate(regimes):
             parts, _ = ndimage.label(cells == number)
-            for index, (up, across) in enumerate(ndimage.find_objects(parts), 1):
-                share = float(np.count_nonzero(parts[up, across] == index) / cells.size)
-                omega = (first + s / columns * (last - first) for s in (across.start, across.stop))
+            for index, (up, along) in enumerate(ndimage.find_objects(parts), 1):
+                share = float(np.count_nonzero(parts[up, along] == index) / cells.size)
+                omega = (first + s / columns * (last - first) for s in (along.start, along.stop))
                 values = (low + s / rows * (high - low) for s in (up.start, up.stop))
                 regions.append(Region(regime, share, tuple(omega), tuple(values)))
         return tuple(sorted(regions, key=lambda region: -region.share))
@@ -270,10 +391,6 @@ class RegimeMap(Stored):
                 for value, a, b in zip(values, first, last, strict=True):
                     if b > a:
                         yield (number, which, arc.nu, arc.isolated, *kinds, float(value), float(a), float(b))
-
-    def to_dataframe(self) -> pandas.DataFrame:
-        """`to_table` as a table of pandas."""
-        return self.to_table().to_dataframe()
 
     def plot(self, path: str | Path | None = None, **options: Any) -> Any:
         """The plane coloured by regime, with the borders; options are those of `pictures.regimes.plot_regimes`."""
@@ -421,17 +538,16 @@ class RegimeCheck:
             f"{self.points} points, {len(self.landings)} trajectories: {100.0 * self.rate:.2f} % of those that settled "
             f"agree, {100.0 * self.agreeing:.2f} % of the points ({counts})"
         )
-        for line, times in Counter(map(self._in_words, self.disagreements)).items():
-            text += f"\n  {line}" + (f" ({times} trajectories)" if times > 1 else "")
-        return text
-
-    def _in_words(self, one: Landing) -> str:
-        what = period_name(one.period) if one.period else "nothing periodic"
-        begun = "a random state" if one.start == "state" else f"the {one.start} motion"
-        return (
-            f"omega = {one.omega:.6g}, {self.name} = {one.value:.6g}, from {begun}: {what}, amplitude "
-            f"{one.amplitude:.4g}; the map has {one.expected}: {one.verdict}"
-        )
+        lines = []
+        for one in self.disagreements:
+            what = period_name(one.period) if one.period else "nothing periodic"
+            begun = "a random state" if one.start == "state" else f"the {one.start} motion"
+            lines.append(
+                f"\n  omega = {one.omega:.6g}, {self.name} = {one.value:.6g}, from {begun}: {what}, amplitude "
+                f"{one.amplitude:.4g}; the map has {one.expected}: {one.verdict}"
+            )
+        counted = Counter(lines).items()
+        return text + "".join(line + (f" ({times} trajectories)" if times > 1 else "") for line, times in counted)
 
 
 @dataclass(frozen=True, eq=False)
@@ -481,29 +597,22 @@ class _Check:
 
     def landings(self, transient: int, report: Any) -> list[Landing]:
         """What the trajectories settle on, with verdicts, in the order of the points."""
-        reached: dict[_Start, Attractor] = {}
-        if self.starts:
-            reached = self._settled({start: start.state for start in self.starts}, transient, report)
+        reached = self._settled({start: start.state for start in self.starts}, transient, report)
         moving = {s: a.points[-1] for s, a in reached.items() if not a.period and np.isfinite(a.points).all()}
-        if moving:
-            reached |= self._settled(moving, _LONGER * transient, None)
+        reached |= self._settled(moving, _LONGER * transient, None)
         judged = [self._judged(start, attractor) for start, attractor in reached.items()]
         return sorted([*self.unsolved, *judged], key=lambda one: (one.omega, one.value))
 
     def _settled(self, states: Mapping[_Start, Array], periods: int, progress: Any) -> dict[_Start, Attractor]:
         """What trajectories settle on that go on from states at the points of some of the starts."""
+        if not states:
+            return {}
+        omega, values = (np.array([getattr(start, name) for start in states]) for name in ("omega", "value"))
         sections = poincare_sections(
-            self.regimes.system,
-            np.array(list(states.values())),
-            omega=np.array([start.omega for start in states]),
-            parameters={self.regimes.parameter: np.array([start.value for start in states])},
-            transient=periods,
-            periods=_KEPT,
-            tolerance=_TOLERANCE,
-            period_tolerance=_REPEATS,
-            observe=self.regimes.options.get("observe"),
-            progress=progress,
-        )
+            self.regimes.system, np.array(list(states.values())), omega=omega, transient=periods, periods=_KEPT,
+            parameters={self.regimes.parameter: values}, tolerance=_TOLERANCE, period_tolerance=_REPEATS,
+            observe=self.regimes.options.get("observe"), progress=progress,
+        )  # fmt: skip
         pass_on(sections.interruption)
         return {start: sections.attractor(i) for i, start in enumerate(states)}
 

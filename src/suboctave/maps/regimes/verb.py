@@ -14,27 +14,28 @@ quasi-periodic and chaotic ones, and branches that nothing leads to, are not kno
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise, product
 from typing import Any, Unpack
 
 import numpy as np
 
-from suboctave.analysis.branches import continue_branch
+from suboctave.analysis.branches import continue_branch, frequency_response
+from suboctave.analysis.diagram import Followed, grown_from
 from suboctave.analysis.options import SearchOptions
-from suboctave.analysis.subharmonics import Seeds
-from suboctave.bifurcation.bifurcation import TrackedEvent
+from suboctave.analysis.subharmonics import Seeds, check_seeds
+from suboctave.bifurcation.bifurcation import Bifurcation, TrackedEvent
 from suboctave.curves.discretisation import Harmonics
-from suboctave.curves.identity import lies_on
+from suboctave.curves.identity import lies_on, mirrored
 from suboctave.curves.junction import period_name
 from suboctave.errors import InputError, is_number, shortened
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.interruption import pass_on, unlimited
-from suboctave.maps.catalogue import COARSE, MOST_VALUES, Catalogue, check_seeds, checked_orders
+from suboctave.maps.catalogue import FAILURES, MOST_VALUES, Catalogue, SearchRange, branch_through, checked_orders
 from suboctave.maps.isolas.result import Isolas
-from suboctave.maps.regimes.map import RegimeMap
-from suboctave.maps.regimes.slices import Slice, Strip, follow_curves_beside, follow_curves_of
+from suboctave.maps.pieces import MonotonePiece, Stretch, same_branch, stretches
+from suboctave.maps.regimes.map import Arc, Edge, RegimeMap, Slice, Strip
 from suboctave.model.inputs import check_count, timed
 from suboctave.model.system import System
 from suboctave.options import with_options
@@ -46,6 +47,12 @@ _NEARLY, _FINE = 0.6, 1.0 / 32.0
 _INSIDE = 0.02
 #: critical values closer to each other, in shares of the parameter's range, are one
 _TOGETHER = 1e-9
+#: ends of branches this close to the end of the range, relatively, lie on it
+_AT_END = 1e-6
+#: stretches without a point, narrower than this share of the range, are taken for unstable without a note
+_NARROW = 1e-4
+#: where along an arc its motions are compared with those of another
+_SAMPLES = (0.1, 0.3, 0.5, 0.7, 0.9)
 
 
 @with_options(SearchOptions)
@@ -107,7 +114,7 @@ def regime_map(
     if not is_number(resolution) or not 0.0 < resolution < 0.5:
         raise InputError(f"resolution must be a share of the range between 0 and 0.5, not {resolution!r}")
     followed = _checked_isolas(isolas, parameter)
-    orders, fine, given = checked_orders(search, 1), check_seeds(seeds) or COARSE, _checked_motions(motions, catalogue)
+    orders, fine, given = checked_orders(search, 1), check_seeds(seeds), _checked_motions(motions, catalogue)
     places = [catalogue.bounds[0] + (i + 0.5) / values * catalogue.span for i in range(values)]
     plan = _Survey(catalogue, 2**depth, resolution, max_slices)
     kept = "the map holds what had been found by then"
@@ -117,7 +124,7 @@ def regime_map(
         _follow_motions(given, catalogue)
         for value, order in product(places, orders):
             for branch in catalogue.resonant(value, order, fine, []):
-                follow_curves_of(branch, value, catalogue)
+                _follow_curves_of(branch, value, catalogue)
         plan.fill(places)
     with unlimited():
         return RegimeMap(catalogue, plan.strips(), depth, resolution)
@@ -160,7 +167,194 @@ def _follow_motions(motions: Sequence[PeriodicOrbit], catalogue: Catalogue) -> N
             branch = continue_branch(orbit, "omega", catalogue.omega.around, **catalogue.options)
             pass_on(branch.interruption)
             known.append((value, branch))
-            follow_curves_of(branch, value, catalogue)
+            _follow_curves_of(branch, value, catalogue)
+
+
+# --------------------------------------------------------------------------------------------------------- slices
+@dataclass(eq=False, kw_only=True)
+class _GrowingSlice(Slice):
+    """All branches at one value of the design parameter, up to a period, followed as curves become known.
+
+    The response with the branches that bifurcate from it, begun at both ends of the range; then a branch through every
+    limit point of a known curve that lies on none of these: isolas, and branches that lead through the range elsewhere.
+
+    catalogue, longest
+        What is known of bifurcations, and the longest period, in periods of the load, that is followed.
+    reach
+        Range of omega in which the responses were followed; None before they are.
+    explained
+        Stretches of curves of limit points that lie on one of the branches there.
+    """
+
+    catalogue: Catalogue
+    longest: int
+    reach: SearchRange | None = None
+    explained: list[MonotonePiece] = field(default_factory=list)
+
+    def complete(self) -> None:
+        """Follow the branches; bifurcations met are followed over the parameter if they are new.
+
+        Called again it adds branches through limit points that have become known since, and begins anew where
+        bifurcations beyond the range have, from which branches lead into it.
+        """
+        places = (p for p in self.catalogue.pieces if p.kind in ("PD", "BP") and p.contains(self.value))
+        reach = self.catalogue.omega.holding(float(piece.across(self.value)) for piece in places)
+        before = len(self.branches)
+        if self.reach is None or reach.low < self.reach.low or reach.high > self.reach.high:
+            self.reach, before = reach, -1
+            self.branches, self.arcs, self.explained = [], [], []
+            # the response from both ends with all that bifurcates from it
+            for diagram in self.catalogue.responses(self.value, reach, Followed(longest=self.longest)):
+                known = [branch for branch, _ in self.branches]
+                for branch in diagram.branches:
+                    if len(branch) and not any(same_branch(branch, other) for other in known):
+                        self._add(branch, False)
+        for piece in self._unexplained():
+            for branch, isolated in self._through(piece):
+                self._add(branch, isolated)
+        if len(self.branches) > before:
+            self._collect_arcs()
+
+    def _add(self, branch: Branch, isolated: bool) -> None:
+        """A branch becomes known, and that its limit points lie on it."""
+        self.branches.append((branch, isolated))
+        for item in branch.bifurcations["LP"]:
+            piece = self.catalogue.known(item, self.value)
+            if piece is not None and piece not in self.explained:
+                self.explained.append(piece)
+
+    def _is_known(self, branch: Branch) -> bool:
+        return any(same_branch(branch, other) for other, _ in self.branches)
+
+    def _unexplained(self) -> Iterator[MonotonePiece]:
+        """Limit points within the range that lie on no branch that is known by then."""
+        low, high = self.catalogue.omega
+        for piece in self.catalogue.pieces:  # to which more are added on the way
+            new = piece.kind == "LP" and piece not in self.explained and piece.contains(self.value)
+            if new and low <= float(piece.across(self.value)) <= high:
+                yield piece
+
+    def _through(self, piece: MonotonePiece) -> Iterator[tuple[Branch, bool]]:
+        """The branch through a limit point, its mirror image if that is another one, and what bifurcates from them."""
+        catalogue, value, options = self.catalogue, self.value, self.catalogue.options
+        met: list[Branch] = []
+        where = f"omega = {float(piece.across(value)):.6g}, {catalogue.name} = {value:.6g}"
+        with catalogue.noting(f"the branch through the limit point at {where} could not be followed", FAILURES):
+            met = self._both_images(piece)
+        for one in met:
+            if self._is_known(one):
+                self.explained.append(piece)
+                continue
+            attached = [known for known, isolated in self.branches if not isolated]
+            detached = catalogue.carrier(one, value, attached) is not None
+            diagram = grown_from(one, Followed(longest=self.longest), options)
+            catalogue.note_failures(diagram, value)
+            for branch in diagram.branches:
+                if not self._is_known(branch):
+                    yield branch, detached
+
+    def _both_images(self, piece: MonotonePiece) -> list[Branch]:
+        """The branch through a limit point, and its mirror image where that is another branch."""
+        catalogue, options = self.catalogue, self.catalogue.options
+        start = piece.solve_at(self.value)
+        branch = branch_through(start, catalogue.omega, catalogue.name, catalogue.limit_points, options)
+        pass_on(branch.interruption)
+        if branch.nu > 1 and not branch.closed and branch.departs is None and branch.arrives is None:
+            # it may close where no limit point is known yet
+            low, high = sorted(branch.options["bounds"]["omega"])
+            wider = continue_branch(start, "omega", SearchRange(low, high).around, **options)
+            pass_on(wider.interruption)
+            branch = wider if wider.closed else branch
+        image = mirrored(branch.points[len(branch) // 2].orbit)
+        if image is None or lies_on(image, branch.points):
+            return [branch]
+        other = continue_branch(image, "omega", branch.options["bounds"]["omega"], **options)
+        pass_on(other.interruption)
+        return [branch, other]
+
+    # ---------------------------------------------------------------------------------------------------------- arcs
+    def _collect_arcs(self) -> None:
+        """The stable arcs of all branches, what ends them followed over the parameter; each once."""
+        self.arcs = []
+        located = [item for branch, _ in self.branches for item in branch.bifurcations]
+        low, high = self.catalogue.omega
+        for branch, isolated in self.branches:
+            for stretch in stretches(branch, located):
+                if stretch.stable is None and stretch.width > _NARROW * (high - low):
+                    self.catalogue.note(
+                        f"at {self.catalogue.name} = {self.value:.6g} no motion was computed on a stretch of a "
+                        f"{period_name(branch.nu)} branch {stretch.width:.2g} wide in omega: taken for unstable"
+                    )
+                beyond = 2 * branch.nu > self.longest and stretch.doubled
+                if stretch.stable or beyond:
+                    self._add_arc(self._arc(stretch, isolated, beyond))
+
+    def _add_arc(self, arc: Arc) -> None:
+        """Branches begun at different ends may have a part in common: the longer one shows where it ends."""
+        alike = next((i for i, other in enumerate(self.arcs) if other.nu == arc.nu and _shared(arc, other)), None)
+        if alike is None:
+            self.arcs.append(arc)
+        elif sum(edge.bound for edge in arc.edges) < sum(edge.bound for edge in self.arcs[alike].edges):
+            self.arcs[alike] = arc
+
+    def _arc(self, stretch: Stretch, isolated: bool, beyond: bool) -> Arc:
+        catalogue = self.catalogue
+        edges = []
+        low, high = catalogue.omega
+        slack = _AT_END * (high - low)
+        for end in stretch.ends:
+            if not isinstance(end, float):
+                edges.append(Edge(end.omega, catalogue.known(end, self.value), end.kind))
+                continue
+            bound = end <= low + slack or end >= high - slack
+            if not bound:
+                catalogue.note(
+                    f"at {catalogue.name} = {self.value:.6g} a branch of stable motions ends at omega = {end:.6g}: "
+                    f"{stretch.branch.ended}"
+                )
+            outside = -float("inf") if end <= low + slack else float("inf")
+            edges.append(Edge(outside if bound else end, bound=bound))
+        first, last = sorted(edges, key=lambda edge: edge.omega)
+        return Arc(stretch.branch.nu * (1 + beyond), isolated, (first, last), stretch.points, not beyond)
+
+
+def _shared(one: Arc, other: Arc) -> bool:
+    """Whether two arcs of one period have motions in common."""
+    pairs = ((one.points, other.points), (other.points, one.points))
+    return any(
+        lies_on(points[min(round(share * len(points)), len(points) - 1)].orbit, others)
+        for points, others in pairs
+        for share in _SAMPLES
+    )
+
+
+def _follow_curves_of(branch: Branch, value: float, catalogue: Catalogue) -> None:
+    """Follow the limit points of a branch that no bifurcation leads to: they lead to it at every value."""
+    before = len(catalogue.pieces)
+    known = [catalogue.known(item, value) for item in branch.bifurcations["LP"]]
+    if not any(known) and before == len(catalogue.pieces):
+        catalogue.note(
+            f"a branch of {period_name(branch.nu)} motions at {catalogue.name} = {value:.6g} has no limit point that "
+            "could be followed: it is not on the map"
+        )
+
+
+def _follow_curves_beside(value: float, catalogue: Catalogue) -> None:
+    """Follow limit points of the response beside the range, between which and others it runs through the range.
+
+    A resonance that begins below the range of omega and folds within it is met so, by no curve within the range.
+    """
+    low, high = catalogue.omega
+    around = catalogue.omega.around
+    with catalogue.noting(f"at {catalogue.name} = {value:.6g} the response beside the range of omega was not found"):
+        wide = frequency_response(catalogue.at(value), around[::-1], catalogue.harmonics, **catalogue.options)
+        pass_on(wide.interruption)
+        folds: list[Bifurcation] = wide.bifurcations["LP"]
+        places = [float(wide.omega[0]), *(b.omega for b in folds), float(wide.omega[-1])]
+        for number, (one, other) in enumerate(pairwise(places)):
+            if min(one, other) < high and max(one, other) > low:
+                for item in folds[max(number - 1, 0) : number + 1]:
+                    catalogue.known(item, value)
 
 
 @dataclass
@@ -177,13 +371,13 @@ class _Survey:
     longest: int
     resolution: float
     most: int
-    slices: list[Slice] = field(default_factory=list)
+    slices: list[_GrowingSlice] = field(default_factory=list)
 
     def fill(self, values: Sequence[float]) -> None:
         """Add slices until every strip has one, and no limit point known is unexplained at any of them."""
         catalogue, waiting = self.catalogue, list(values)
         for value in dict.fromkeys((values[0], values[-1])):
-            follow_curves_beside(value, catalogue)
+            _follow_curves_beside(value, catalogue)
         while waiting:
             for number, value in enumerate(waiting):
                 if len(self.slices) >= self.most:
@@ -193,7 +387,7 @@ class _Survey:
                     return
                 share = len(self.slices) / (len(self.slices) + len(waiting) - number + 3.0)
                 catalogue.progress(share, f"{catalogue.name} = {value:.6g}")
-                new = Slice(value, catalogue, self.longest)
+                new = _GrowingSlice(value, catalogue=catalogue, longest=self.longest)
                 new.complete()
                 self.slices.append(new)
             # limit points that have become known later may lie on branches that were not met before
@@ -202,7 +396,8 @@ class _Survey:
                 count = len(catalogue.curves)
                 for known in self.slices:
                     known.complete()
-            waiting = self._empty_strips() or self._doubtful()
+            empty = [0.5 * (a + b) for a, b, within in self._strips(self.resolution) if not within]
+            waiting = empty or self._doubtful()
 
     def critical(self) -> list[float]:
         """Values of the parameter, ascending, bounds included, at which the order of the regimes may change.
@@ -234,19 +429,13 @@ class _Survey:
                 distinct.append(value)
         return distinct
 
-    def _empty_strips(self) -> list[float]:
-        """The middles of strips that no slice lies in."""
-        wide = self.resolution * self.catalogue.span
-        strips = ((a, b) for a, b in pairwise(self.critical()) if b - a >= wide)
-        return [0.5 * (a + b) for a, b in strips if not any(_inside(s.value, a, b) for s in self.slices)]
-
     def _doubtful(self) -> list[float]:
         """Values beside those at which a motion nearly doubles its period: a pair of doublings may begin between them.
 
         It would lie on no branch that was met, so that no curve shows it.
         """
         values = []
-        for a, b in pairwise(self.critical()):
+        for a, b, _ in self._strips():
             within = sorted((s for s in self.slices if a <= s.value <= b), key=lambda s: s.value)
             places = [a, *(s.value for s in within), b]
             for i, near in enumerate(within, 1):
@@ -259,14 +448,15 @@ class _Survey:
     def strips(self) -> list[Strip]:
         """The strips with their slices; those without one take that of a neighbour."""
         strips = []
-        for a, b in pairwise(self.critical()):
-            within = [s for s in self.slices if _inside(s.value, a, b)]
+        for a, b, within in self._strips():
             middle = 0.5 * (a + b)
             nearest = min(within or self.slices, key=lambda s: abs(s.value - middle), default=None)
             strips.append(Strip(a, b, nearest, bool(within)))
         return strips
 
-
-def _inside(value: float, low: float, high: float) -> bool:
-    margin = _INSIDE * (high - low)
-    return low + margin <= value <= high - margin
+    def _strips(self, least: float = 0.0) -> Iterator[tuple[float, float, list[_GrowingSlice]]]:
+        """Stretches between critical values, at least this share of the range wide, with the slices well inside."""
+        for a, b in pairwise(self.critical()):
+            if b - a >= least * self.catalogue.span:
+                margin = _INSIDE * (b - a)
+                yield a, b, [s for s in self.slices if a + margin <= s.value <= b - margin]
