@@ -13,7 +13,7 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from suboctave.analysis.options import CurveOptions, CurveRun, Inherited, settings_of
+from suboctave.analysis.options import CurveOptions, CurveRun, Inherited, check_inside, settings_of
 from suboctave.analysis.subharmonics import check_order, subharmonic_start
 from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.bifurcation.bordered import branching_equation, null_vectors
@@ -151,10 +151,7 @@ def continue_branch(
     check_parameter(system, parameter)
     ends = check_bounds(system, parameter, bounds)
     value = orbit.omega if parameter == "omega" else orbit.values[parameter]
-    low, high = sorted(ends)
-    slack = 1e-12 * (high - low)
-    if not low - slack <= value <= high + slack:
-        raise InputError(f"the motion has {parameter}={value:.6g}, outside the bounds ({low:g}, {high:g})")
+    check_inside("the motion", parameter, value, ends, 1e-12)
     if omega is not None and not (is_number(omega) and abs(omega - orbit.omega) <= 1e-12 * orbit.omega):
         raise InputError(f"omega={omega!r} differs from the motion's {orbit.omega:g}: leave it out")
     wanted = harmonics_of(orbit) if harmonics is None else harmonics
@@ -165,7 +162,7 @@ def continue_branch(
             # two branches cross: go on along that on which the point was found
             trace = leave_along(crossing, curve, np.array(crossing.tangent), run)
         else:
-            point = start_point(curve, min(high, max(low, value)), orbit, run.settings.newton)
+            point = start_point(curve, min(max(ends), max(min(ends), value)), orbit, run.settings.newton)
             trace = both_ways(point, run.ahead, run.bounds, run.settings)
     return run.branch(trace)
 
@@ -290,10 +287,7 @@ def switch_branch(
     orbit, name = bifurcation.orbit, bifurcation.parameter_name
     known = Inherited(bifurcation)
     ends = check_bounds(orbit.system, name, known.bounds(name) if bounds is None else bounds)
-    value = bifurcation.parameter(name)
-    low, high = sorted(ends)
-    if not low <= value <= high:
-        raise InputError(f"the {KINDS[kind].words} has {name}={value:.6g}, outside the bounds ({low:g}, {high:g})")
+    check_inside(f"the {KINDS[kind].words}", name, bifurcation.parameter(name), ends)
     settings = replace(settings_of(orbit.system, known.under(options)), half=kind == "BP" and side is not None)
     nu = orbit.basis.nu * (2 if kind == "PD" else 1)
     run = CurveRun(orbit.system, name, ends, harmonics_of(orbit) if harmonics is None else harmonics, settings)

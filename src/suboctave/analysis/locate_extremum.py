@@ -80,28 +80,20 @@ def locate_extremum(
     names = (extremum.names[0], extremum.names[1])
     with one_thread():
         curve, u = curve_through(extremum, orbit.basis, names)
-        options = replace(settings.newton, iterations=max(_ITERATIONS, settings.newton.iterations))
-        u = newton_extremum(curve, u, extremum.parameter_name, options, chosen)
-        sample = Sample(nearest_point(curve, u, curve.weights(u, 0.0), options))
+        newton = replace(settings.newton, iterations=max(_ITERATIONS, settings.newton.iterations))
+        weights = curve.weights(u, 0.0)
+        # from a point of the curve both systems need but follow it
+        u = nearest_point(curve, u, weights, newton).u
+        last = replace(newton, correction=min(newton.correction, _CORRECTION), rounding=True)
+        if isinstance(chosen, Alcorta2019):
+            published = _Published(curve, extremum.parameter_name, weights)
+            u = correct(published, published.first(u), None, published.scale, last).u[: len(u)]
+        else:
+            u = correct(with_extremum(curve, u, extremum.parameter_name), u, None, weights, last).u
+        sample = Sample(nearest_point(curve, u, curve.weights(u, 0.0), newton))
         located = LocatedEvent(Extremum(extremum.parameter_name), sample, extremum.extreme)
         event = as_event(located, settings.stability, settings.observe)
     return replace(event, arclength=extremum.arclength, context=extremum.context)
-
-
-def newton_extremum(
-    curve: MotionProblem, u: Array, turning: str, newton: NewtonOptions, formulation: Formulation | None = None
-) -> Array:
-    """u at the extremum of a parameter along a curve of bifurcations in two parameters, from a guess near it."""
-    weights = curve.weights(u, 0.0)
-    # from a point of the curve both systems need but follow it
-    u = nearest_point(curve, u, weights, newton).u
-    options = replace(newton, correction=min(newton.correction, _CORRECTION), rounding=True)
-    if isinstance(formulation, Alcorta2019):
-        published = _Published(curve, turning, weights)
-        whole = correct(published, published.first(u), None, published.scale, options).u
-        return whole[: len(u)]
-    bordered = with_extremum(curve, u, turning)
-    return correct(bordered, u, None, weights, options).u
 
 
 @dataclass(frozen=True, eq=False)

@@ -180,6 +180,14 @@ class Inherited:
         return cast("CurveOptions", inherited | given)
 
 
+def check_inside(what: str, name: str, value: float, ends: tuple[float, float], slack: float = 0.0) -> None:
+    """Refuse a start outside its range by more than a share of that."""
+    low, high = sorted(ends)
+    room = slack * (high - low)
+    if not low - room <= value <= high + room:
+        raise InputError(f"{what} has {name}={value:.6g}, outside the bounds ({low:g}, {high:g})")
+
+
 @dataclass(frozen=True)
 class CurveRun:
     """Motions of a system over a range of one parameter, from the first to the last value, and how they are followed.

@@ -26,7 +26,7 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from suboctave.analysis.options import Inherited, TrackOptions, options_of, settings_of
+from suboctave.analysis.options import Inherited, TrackOptions, check_inside, options_of, settings_of
 from suboctave.bifurcation.bifurcation import CURVES_THROUGH, Bifurcation, TrackedEvent, kind_of
 from suboctave.bifurcation.bordered import null_vectors, transversality
 from suboctave.continuation import CurvePoint, NewtonOptions, SteppingOptions
@@ -201,7 +201,9 @@ def _third(item: TrackedEvent, parameter: Any, bounds: Any, omega: Any) -> tuple
             more = high - low if name == item.parameter_name else 0.0
             kept[name] = low - more, high + more
     ranges = _ranges(system, omega, kept, parameter, bounds)
-    _check_inside(item, {name: ranges[name] for name in (item.names[0], parameter) if name in ranges})
+    for name in (item.names[0], parameter):
+        if name in ranges:
+            check_inside("the bifurcation", name, item.parameter(name), ranges[name], 1e-9)
     return (*item.names, parameter), ranges
 
 
@@ -242,17 +244,9 @@ def _free(item: Bifurcation, parameter: Any, bounds: Any, omega: Any) -> tuple[t
         if not isinstance(bounds, Sequence) or len(bounds) != 2 or any(is_number(b) for b in bounds):
             raise InputError(f"bounds of two parameters are two ranges, ((from, to), (from, to)), not {bounds!r}")
         ranges = {name: check_bounds(system, name, r) for name, r in zip(names, bounds, strict=True)}
-    _check_inside(item, ranges)
-    return names, ranges
-
-
-def _check_inside(item: Bifurcation, ranges: Ranges) -> None:
-    """Refuse a bifurcation outside the ranges."""
     for name, ends in ranges.items():
-        value, (low, high) = item.parameter(name), sorted(ends)
-        slack = 1e-9 * (high - low)
-        if not low - slack <= value <= high + slack:
-            raise InputError(f"the bifurcation has {name}={value:.6g}, outside the bounds ({low:g}, {high:g})")
+        check_inside("the bifurcation", name, item.parameter(name), ends, 1e-9)
+    return names, ranges
 
 
 def _harmonics(item: Bifurcation, given: Any) -> tuple[Any, AdaptiveHarmonics | None, HarmonicBasis]:

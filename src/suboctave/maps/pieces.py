@@ -129,10 +129,6 @@ class MonotonePiece:
         passed = np.nonzero(np.signbit(gap[:-1]) != np.signbit(gap[1:]))[0]
         return [float(abscissa[i] + (abscissa[i + 1] - abscissa[i]) * gap[i] / (gap[i] - gap[i + 1])) for i in passed]
 
-    def node_beside(self, value: float) -> TrackedPoint:
-        """The node nearest to a value of `along`."""
-        return self.nodes[int(np.argmin(np.abs(self.values - value)))]
-
     def cut_at(self, value: float) -> TrackedPoint:
         """The bifurcation at a value of `along`, located, as a point of the curve."""
         index, share = self._around(value)

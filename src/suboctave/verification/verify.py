@@ -14,7 +14,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from operator import index
-from typing import Any, TypeVar, overload
+from typing import Any, overload
 
 import numpy as np
 
@@ -245,11 +245,10 @@ def _verify_branch(
     interruption: Interruption | None = None
     with reporting(progress, "verifying") as report, one_thread():
         try:
-            for part in shots.batches(which):
+            for i, shot in zip(which, shots.motions([branch.points[i].orbit for i in which]), strict=True):
                 if report is not None:
                     report(len(checked) / whole, f"{len(checked)} of {len(which)} points")
-                for i, shot in zip(part, shots.motions([branch.points[i].orbit for i in part]), strict=True):
-                    checked.append(_judged(branch, i, shot, tolerance))
+                checked.append(_judged(branch, i, shot, tolerance))
             quick = _quick(shots, items, tolerance)
             for done, item in enumerate(items):
                 if report is not None:
@@ -321,12 +320,12 @@ def _judged(branch: Branch, i: int, shot: Shot, tolerance: float) -> VerifiedPoi
 
 def _quick(shots: Shots, items: Sequence[Bifurcation], tolerance: float) -> dict[int, Shot]:
     """The true motions at bifurcations: of those that have a test function along the curve, and of contacts."""
-    shot: dict[int, Shot] = {}
+    found: dict[int, Shot] = {}
     for kinds, reach in ((CONTACT_KINDS, None), (LOCATED, tolerance)):
-        for part in shots.batches([item for item in items if item.kind in kinds]):
-            found = shots.motions([item.orbit for item in part], [item.kind for item in part], reach)
-            shot |= {id(item): one for item, one in zip(part, found, strict=True)}
-    return shot
+        own = [item for item in items if item.kind in kinds]
+        motions = shots.motions([item.orbit for item in own], [item.kind for item in own], reach)
+        found |= {id(item): shot for item, shot in zip(own, motions, strict=True)}
+    return found
 
 
 def _confirmed(item: Bifurcation, shot: Shot | None, tolerance: float, observe: int) -> VerifiedBifurcation:
@@ -348,9 +347,6 @@ def _confirmed(item: Bifurcation, shot: Shot | None, tolerance: float, observe: 
 
 
 # ---------------------------------------------------------------------------------------- multiple shooting, in batches
-Item = TypeVar("Item")
-
-
 @dataclass(frozen=True)
 class Shot:
     """The true motion beside one of harmonic balance, if `converged`.
@@ -376,15 +372,16 @@ class Shots:
         self.system = orbit.balance.system
         self.shooting = MultipleShooting(self.system, orbit.basis.nu, workers)
 
-    def batches(self, items: Sequence[Item]) -> Iterator[Sequence[Item]]:
-        """Items in as many at once as one batch may have motions."""
-        count = self.shooting.at_once
-        return (items[begin : begin + count] for begin in range(0, len(items), count))
-
     def motions(
         self, orbits: Sequence[PeriodicOrbit], kinds: Sequence[str] = (), reach: float | None = None
-    ) -> list[Shot]:
+    ) -> Iterator[Shot]:
         """The true motions beside these; where bifurcations of these kinds lie within `reach` on either side."""
+        count = self.shooting.at_once
+        for begin in range(0, len(orbits), count):
+            end = begin + count
+            yield from self._batch(orbits[begin:end], kinds[begin:end], reach)
+
+    def _batch(self, orbits: Sequence[PeriodicOrbit], kinds: Sequence[str], reach: float | None) -> list[Shot]:
         states, omega, parameters, sizes = self._starts(orbits)
         middle = self.shooting.solve(states, omega, parameters, sizes)
         multipliers, errors = middle.multipliers()

@@ -161,7 +161,11 @@ class _Regions(Work):
             ends.append(min(borders, key=lambda b: abs(float(b.across(here)) - float(end))))
             if curve not in curves:
                 curves.append(curve)
-        span = spans_of(here, (ends[0], ends[1]), self.bounds, second)
+        both = ends[0], ends[1]
+        # how far both ends can be followed to either side
+        sides = (_reached(here, both, self.bounds, second, upper) for upper in (False, True))
+        (low, high), reasons, closed, settled = zip(*sides, strict=True)
+        span = Span(low, high, both, reasons, closed, settled)
         self.notes += [reason for reason, settled in zip(span.reasons, span.settled, strict=True) if not settled]
         region = IsolaRegion(isola, second, span, tuple(curves))
         self.regions.append(replace(region, probes=tuple(self._probes(region, probes))))
@@ -185,7 +189,8 @@ class _Regions(Work):
             probes = [span.low + float(share) * (span.high - span.low) for share in shares]
         border = next((e for e in span.ends if isinstance(e, MonotonePiece)), None)
         if border is not None:
-            yield from (self._probe(region, border.node_beside(s)) for s in map(float, probes) if span.contains(s))
+            for s in (float(s) for s in probes if span.contains(float(s))):
+                yield self._probe(region, border.nodes[int(np.argmin(np.abs(border.values - s)))])
 
     def _probe(self, region: IsolaRegion, node: TrackedPoint) -> Probe:
         """Follow the limit points at one value of the second parameter, and the branch in the middle of the range.
@@ -255,13 +260,6 @@ class Span:
         values = self.low + share * (self.high - self.low)
         low, high = (across(end, values) for end in self.ends)
         return values, low, high
-
-
-def spans_of(start: float, ends: Ends, bounds: tuple[float, float], second: str) -> Span:
-    """The stretch of s around `start` over which both ends can be followed."""
-    sides = (_reached(start, ends, bounds, second, upper) for upper in (False, True))
-    (low, high), reasons, closed, settled = zip(*sides, strict=True)
-    return Span(low, high, ends, reasons, closed, settled)
 
 
 def _reached(
