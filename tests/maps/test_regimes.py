@@ -8,7 +8,8 @@ import pytest
 import suboctave as so
 from suboctave.analysis.diagram import Followed, grown_from
 from suboctave.maps.catalogue import Catalogue, SearchRange, carrier_of
-from suboctave.maps.regimes.map import Arc, Edge, RegimeMap, Slice, Strip
+from suboctave.maps.regimes.arcs import Arc, Edge, Slice, Strip
+from suboctave.maps.regimes.map import RegimeMap
 
 DAMPING, STIFF = 0.1, 1.0
 

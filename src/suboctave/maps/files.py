@@ -36,7 +36,8 @@ from suboctave.maps.catalogue import Catalogue, SearchRange
 from suboctave.maps.isolas.map import IsolaMap, IsolaRegion, Probe, Span
 from suboctave.maps.isolas.result import Isola, IsolaEnd, Isolas, head_dataset
 from suboctave.maps.pieces import MonotonePiece, pieces_of
-from suboctave.maps.regimes.map import Arc, Edge, RegimeMap, Slice, Strip
+from suboctave.maps.regimes.arcs import Arc, Edge, Slice, Strip
+from suboctave.maps.regimes.map import RegimeMap
 from suboctave.results.branch import Branch
 from suboctave.results.files import branch_from_dataset, branch_to_dataset
 from suboctave.store.layout import parameter_column

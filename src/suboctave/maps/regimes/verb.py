@@ -35,7 +35,8 @@ from suboctave.interruption import pass_on, unlimited
 from suboctave.maps.catalogue import FAILURES, MOST_VALUES, Catalogue, SearchRange, branch_through, checked_orders
 from suboctave.maps.isolas.result import Isolas
 from suboctave.maps.pieces import MonotonePiece, Stretch, same_branch, stretches
-from suboctave.maps.regimes.map import Arc, Edge, RegimeMap, Slice, Strip
+from suboctave.maps.regimes.arcs import Arc, Edge, Slice, Strip
+from suboctave.maps.regimes.map import RegimeMap
 from suboctave.model.inputs import check_count, timed
 from suboctave.model.system import System
 from suboctave.options import with_options
