@@ -13,8 +13,7 @@ from scipy.optimize import fsolve
 import suboctave as so
 from suboctave.analysis.options import settings_of
 from suboctave.continuation import NewtonOptions, SteppingOptions
-from suboctave.continuation.march import March
-from suboctave.continuation.place import Place
+from suboctave.continuation.march import March, Place
 from suboctave.curves.tracked.start import solved_start
 from suboctave.timedomain import locate_by_shooting, state_transition
 

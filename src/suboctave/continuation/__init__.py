@@ -1,9 +1,8 @@
 """How a curve is followed: Newton's method, scaled arclength, events. No vibration in here: it follows any curve."""
 
 from suboctave.continuation.events import Event
-from suboctave.continuation.march import March
+from suboctave.continuation.march import March, SteppingOptions
 from suboctave.continuation.newton import NewtonOptions
 from suboctave.continuation.point import CurvePoint
-from suboctave.continuation.stepping import SteppingOptions
 
 __all__ = ["CurvePoint", "Event", "March", "NewtonOptions", "SteppingOptions"]

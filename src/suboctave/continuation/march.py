@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -20,11 +20,9 @@ from suboctave.continuation.bounds import Bounds
 from suboctave.continuation.ending import Ending, EndReason
 from suboctave.continuation.linear import cosine, distance, length
 from suboctave.continuation.newton import NewtonOptions, Solved, closely, correct
-from suboctave.continuation.place import Place
-from suboctave.continuation.point import CurvePoint, make_point
+from suboctave.continuation.point import CurvePoint, between, make_point
 from suboctave.continuation.problem import Array, Curve
-from suboctave.continuation.stepping import SteppingOptions
-from suboctave.errors import ConvergenceError
+from suboctave.errors import ConvergenceError, InputError, check_numbers
 
 #: points behind the last one that a prediction takes into account
 _BEHIND = 2
@@ -40,6 +38,89 @@ _BEYOND, _AT_ONCE, _CLOSE = (1e-6, 1e-5, 1e-4, 1e-3), 1e-5, 100.0
 _CLOSELY, _LEFT = 1e-4, 1e-2
 #: share of a step over which derivatives count as the same
 _SPARED = 2e-4
+#: angle between successive tangents at which a step is refused, radians, unless the aim is large
+_SHARP = 0.75
+
+
+@dataclass(frozen=True)
+class SteppingOptions:
+    """How far the engine steps.
+
+    max_step
+        Largest distance between neighbours in scaled arclength: parameters in units of their range, the solution in
+        units of its own current size (or of 1 % of the largest met so far, if that is larger).
+    initial_step, min_step
+        First step, and the step below which the curve ends with a reason.
+    deviation
+        Aim for the distance between prediction and solution.
+    angle, growth
+        Aim for the angle between successive tangents, radians; by how much at most a curve that turns more and more is
+        expected to turn more from one step to the next.
+    max_points
+        Points after which the curve ends with a reason.
+    """
+
+    max_step: float = 0.06
+    initial_step: float = 0.01
+    min_step: float = 1e-7
+    deviation: float = 0.01
+    angle: float = 0.3
+    growth: float = 1.0
+    max_points: int = 20000
+
+    def __post_init__(self) -> None:
+        check_numbers(**vars(self))
+        if not 0.0 < self.min_step <= self.initial_step:
+            raise InputError(
+                f"initial_step={self.initial_step:g} must be positive and not below min_step={self.min_step:g}"
+            )
+        if not self.min_step < self.max_step < math.inf:
+            raise InputError(f"max_step={self.max_step:g} must lie above min_step={self.min_step:g}")
+        if self.deviation <= 0.0 or not 0.0 < self.angle < 1.6 or self.growth < 1.0 or self.max_points < 2:
+            raise InputError(f"SteppingOptions out of range: {self}")
+
+    @property
+    def sharpest(self) -> float:
+        """Angle between successive tangents at which a step is refused, radians."""
+        return max(_SHARP, 2.5 * self.angle)
+
+
+class Place:
+    """A point of a curve that a march may come back to."""
+
+    def __init__(self, point: CurvePoint) -> None:
+        self.point = point
+        #: values of the parameter at its images
+        self._values = [image[point.curve.parameter] for image in point.curve.images(point.u)]
+        #: its images in the discretisation of the last point
+        self._images: tuple[Curve, list[Array]] | None = None
+
+    def passed(self, point: CurvePoint, new: CurvePoint) -> CurvePoint | None:
+        """It again, if the step from `point` to `new` passes it in the same direction."""
+        w, own = new.weights, self.point
+        step = distance(new.u, point.u, w)
+        here, reach = new.parameter, 1.5 * step / w[new.curve.parameter]
+        if all(abs(here - value) > reach for value in self._values):
+            return None
+        if self._images is None or self._images[0] is not new.curve:
+            self._images = (new.curve, new.curve.images(new.curve.transfer(own.u, own.curve)))
+        for i, turned in enumerate(self._images[1]):
+            image = new.curve.unwrapped(turned, point.u)
+            if max(distance(image, point.u, w), distance(new.u, image, w)) > 1.5 * step:
+                continue
+            from_point, to_new = w * (image - point.u), w * (new.u - image)
+            # a shift in time turns the vector and, where there are instants among the unknowns, moves it
+            start, way = (new.curve.transfer(v, own.curve) for v in (own.u, own.tangent))
+            leaving = new.curve.images(start + way)[i] - turned
+            ahead = from_point @ (w * point.tangent) >= 0.0 and to_new @ (w * new.tangent) > 0.0
+            same_way = (w * leaving) @ (w * new.tangent) > 0.5 * length(w * leaving)
+            if not (ahead and same_way):
+                continue
+            fraction = length(from_point) / (length(from_point) + length(to_new))
+            miss = length(w * (between(point, new, fraction) - image))
+            if miss < 0.05 * step + 1e-6:
+                return replace(own, arclength=point.arclength + length(from_point))
+        return None
 
 
 @dataclass(frozen=True)
@@ -50,6 +131,7 @@ class Arrival:
     ending: Ending
 
 
+@dataclass(eq=False)
 class March:
     """Follows a curve from a start point; iterate over it for the points, then read `ending` and `closed`.
 
@@ -72,30 +154,17 @@ class March:
         Ranges of other unknowns, on which the curve ends as well.
     """
 
-    def __init__(
-        self,
-        start: CurvePoint,
-        direction: float,
-        bounds: tuple[float, float],
-        newton: NewtonOptions,
-        stepping: SteppingOptions,
-        inspect: Callable[[CurvePoint, CurvePoint], bool] | None = None,
-        arrive: Callable[[CurvePoint, CurvePoint], Arrival | None] | None = None,
-        home: CurvePoint | None = None,
-        others: Sequence[Bounds] = (),
-    ) -> None:
-        self.start = start
-        self.bounds = bounds
-        self.newton = newton
-        self.stepping = stepping
-        self.inspect = inspect
-        self.arrive = arrive
-        self.home = home
-        self.closed = False
-        self.ending = Ending(EndReason.NOT_STARTED)
-        self._direction = direction
-        self._ranges = (Bounds(lambda curve: curve.parameter, *bounds), *others)
-        self._close = closely(newton)
+    start: CurvePoint
+    direction: float
+    bounds: tuple[float, float]
+    newton: NewtonOptions
+    stepping: SteppingOptions
+    inspect: Callable[[CurvePoint, CurvePoint], bool] | None = None
+    arrive: Callable[[CurvePoint, CurvePoint], Arrival | None] | None = None
+    home: CurvePoint | None = None
+    others: Sequence[Bounds] = ()
+    closed: bool = field(default=False, init=False)
+    ending: Ending = field(default=Ending(EndReason.NOT_STARTED), init=False)
 
     @property
     def ended(self) -> str:
@@ -105,10 +174,12 @@ class March:
     def __iter__(self) -> Iterator[CurvePoint]:
         """Points in order, the start first."""
         options = self.stepping
-        point = self._set_out()
+        point = self.start
+        if point.tangent[point.curve.parameter] * self.direction < 0.0:
+            point = point.turned
+        ranges = (Bounds(lambda curve: curve.parameter, *self.bounds), *self.others)
         home = Place(self.home or point)
-        mark: Place | None = None
-        marked = 0
+        mark, marked = home, 0
         yield point
         largest = point.curve.size(point.u)
         step = min(options.initial_step, options.max_step)
@@ -116,16 +187,14 @@ class March:
         curve, bend, count = point.curve, 0.0, 1
         while True:
             if count >= options.max_points:
-                where = point.curve.where(point.u)
-                self.ending = Ending(EndReason.MAX_POINTS, where, str(options.max_points))
+                self.ending = Ending(EndReason.MAX_POINTS, point.curve.where(point.u), str(options.max_points))
                 return
             point = self._rescaled(curve, point, largest)
             try:
-                new, step, deviation, turn = self._advance(point, step, behind)
+                new, deviation, turn = self._advance(point, step, behind)
             except ConvergenceError as failure:
                 where = point.curve.where(point.u)
-                detail = f"{options.min_step:.0e} at {where}: {failure}"
-                self.ending = Ending(EndReason.STEP_TOO_SMALL, where, detail)
+                self.ending = Ending(EndReason.STEP_TOO_SMALL, where, f"{options.min_step:.0e} at {where}: {failure}")
                 return
             arrival = None if self.arrive is None else self.arrive(point, new)
             if arrival is not None:
@@ -139,11 +208,13 @@ class March:
                 self.closed, self.ending = True, Ending(EndReason.CLOSED)
                 yield back
                 return
-            if mark is not None and count > marked + 3 and mark.passed(point, new) is not None:
+            if marked and count > marked + 3 and mark.passed(point, new) is not None:
                 self.ending = Ending(EndReason.ASTRAY, new.curve.where(new.u))
                 return
+            landed: CurvePoint | None = None
             try:
-                landed = self._landed(point, new)
+                for ends in ranges:  # the one that it leaves first
+                    landed = ends.left(point, landed or new, self.newton) or landed
             except ConvergenceError:
                 self.ending = Ending(EndReason.LEFT_RANGE, point.curve.where(point.u))
                 return
@@ -164,42 +235,21 @@ class March:
             behind = [point, *behind[: _BEHIND - 1]] if deviation > 0.0 else []
             curve, point = new.curve.adapted(new.u, new.evaluation), new
 
-    def _landed(self, point: CurvePoint, new: CurvePoint) -> CurvePoint | None:
-        """The point at which the curve leaves a range first between two neighbours, None if it stays in all of them."""
-        landed: CurvePoint | None = None
-        for ends in self._ranges:
-            landed = ends.left(point, landed or new, self.newton) or landed
-        return landed
-
-    def _set_out(self) -> CurvePoint:
-        """The start with its tangent pointing in the wanted direction."""
-        point = self.start
-        if point.tangent[point.curve.parameter] * self._direction < 0.0:
-            return point.turned
-        return point
-
     @staticmethod
     def _rescaled(curve: Curve, point: CurvePoint, largest: float) -> CurvePoint:
         """The same point as one of `curve`, with scaling and tangent length of the present amplitude."""
-        p, u, along = point, point.u, point.tangent
-        if curve is not p.curve:
-            u, along = curve.transfer(u, p.curve), curve.transfer(along, p.curve)
+        p, u, along = point, curve.transfer(point.u, point.curve), curve.transfer(point.tangent, point.curve)
         weights = curve.weights(u, largest)
         size = length(weights * along)
         if not 0.0 < size < math.inf:
             raise OverflowError(f"the tangent has the length {size:g}")
         return CurvePoint(curve, u, along / size, weights, p.evaluation, p.orientation, p.arclength, p.iterations)
 
-    def _advance(
-        self, point: CurvePoint, step: float, behind: list[CurvePoint]
-    ) -> tuple[CurvePoint, float, float, float]:
-        """One accepted step: new point, step length used, distance between prediction and solution, and the angle
-        between the tangents.
-        """
-        known = [point, *behind]
-        curve = point.curve
-        points = np.array([p.u if p.curve is curve else curve.transfer(p.u, p.curve) for p in known])
-        tangents = np.array([p.tangent if p.curve is curve else curve.transfer(p.tangent, p.curve) for p in known])
+    def _advance(self, point: CurvePoint, step: float, behind: list[CurvePoint]) -> tuple[CurvePoint, float, float]:
+        """One accepted step: new point, distance between prediction and solution, angle between the tangents."""
+        known, curve, options = [point, *behind], point.curve, self.stepping
+        points = np.array([curve.transfer(p.u, p.curve) for p in known])
+        tangents = np.array([curve.transfer(p.tangent, p.curve) for p in known])
         order = len(known)
         while True:
             try:
@@ -208,29 +258,30 @@ class March:
                 if bound is not None:
                     solved.u[curve.parameter] = bound
                 taken = distance(solved.u, point.u, point.weights)
-                new = make_point(solved, point.curve, point.tangent, point.arclength + taken)
-                turn = self._angle(point, new)
-                fine = turn < self.stepping.sharpest and solved.distance < 0.4 * step
-                fine = fine and taken <= 1.000001 * self.stepping.max_step
-                if step <= self.stepping.min_step:
-                    fine = self._leads_on(point, new)
+                new = make_point(solved, curve, point.tangent, point.arclength + taken)
+                turn = _angle(point, new)
+                if step <= options.min_step:
+                    # not at a jump across a corner, onto the part of the curve behind it, to be followed back into it
+                    fine = float((new.weights * (new.u - point.u)) @ (new.weights * new.tangent)) > 0.0
                     back = new.tangent[curve.parameter] * point.tangent[curve.parameter] < 0.0
-                    if fine and back and turn >= self.stepping.sharpest:
+                    if fine and back and turn >= options.sharpest:
                         # it comes back, or turned by more than a right angle, and its tangent points back wrongly
                         with suppress(ConvergenceError):
                             return self._around_corner(point, ConvergenceError("the curve has a corner"))
-                elif fine and self.inspect is not None:
-                    fine = self.inspect(point, new)
+                else:
+                    fine = turn < options.sharpest and solved.distance < 0.4 * step
+                    fine = fine and taken <= 1.000001 * options.max_step
+                    fine = fine and (self.inspect is None or self.inspect(point, new))
                 if fine:
-                    return new, step, solved.distance, turn
+                    return new, solved.distance, turn
                 failure = ConvergenceError("the curve turns too sharply")
             except ConvergenceError as error:
                 failure = error
-            if step <= self.stepping.min_step:
+            if step <= options.min_step:
                 return self._around_corner(point, failure)
             # what lies behind may not tell what comes
             order = max(1, order - 1)
-            step = max(0.5 * step, self.stepping.min_step)
+            step = max(0.5 * step, options.min_step)
 
     def _solved(self, curve: Curve, guess: Array, row: Array | int, weights: Array, step: float) -> Solved:
         """The point beside a prediction; of a short step, or where the curve asks for it, more closely: what the
@@ -239,11 +290,13 @@ class March:
         delicate = getattr(curve, "delicate", False)
         if delicate or step < _CLOSELY:
             try:
-                return correct(curve, guess, row, weights, self._close, spare=0.0 if delicate else _SPARED * step)
+                close = closely(self.newton)
+                return correct(curve, guess, row, weights, close, spare=0.0 if delicate else _SPARED * step)
             except ConvergenceError:
                 # by rounding perhaps
                 solved = correct(curve, guess, row, weights, self.newton)
-                if solved.factor.singular or length(solved.factor.solve(_missing(solved))) > _LEFT * step:
+                missing = np.append(solved.evaluation.residual, 0.0)
+                if solved.factor.singular or length(solved.factor.solve(missing)) > _LEFT * step:
                     raise
                 return solved
         return correct(curve, guess, row, weights, self.newton, spare=_SPARED * step)
@@ -266,47 +319,34 @@ class March:
         guess[index] = bound
         return guess, index, bound
 
-    def _around_corner(self, point: CurvePoint, failure: ConvergenceError) -> tuple[CurvePoint, float, float, float]:
-        """A point beyond a corner of the equations, where no tangent leads on but the parameter does.
+    def _around_corner(self, point: CurvePoint, failure: ConvergenceError) -> tuple[CurvePoint, float, float]:
+        """A point beyond a corner of the equations, where no tangent leads on but the parameter does; as `_advance`.
 
         A corner is met where a coefficient has one: a gap tracked through zero, whose force at rest begins to change.
         Raises the failure that led here if there is no solution close by.
         """
-        index = point.curve.parameter
+        curve, weights, index = point.curve, point.weights, point.curve.parameter
         heading = math.copysign(1.0, point.tangent[index])
         row = np.zeros(len(point.u))
         row[index] = 1.0
         nearer: CurvePoint | None = None
         for share in _BEYOND:
             guess = point.u.copy()
-            guess[index] += heading * share / point.weights[index]
+            guess[index] += heading * share / weights[index]
             try:
-                solved = correct(point.curve, guess, row, point.weights, self.newton)
-                new = make_point(solved, point.curve, heading * row, point.arclength)
+                solved = correct(curve, guess, row, weights, self.newton)
+                taken = distance(solved.u, point.u, weights)
+                new = make_point(solved, curve, heading * row, point.arclength + taken)
             except ConvergenceError:
                 nearer = None
                 continue
-            taken = length(point.weights * (solved.u - point.u))
-            beyond = replace(new, arclength=point.arclength + taken)
             if share <= _AT_ONCE and taken <= _CLOSE * share:
-                return beyond, self.stepping.initial_step, 0.0, self._angle(point, beyond)
+                return new, 0.0, _angle(point, new)
             # what lies farther comes from the corner if a tenth of the share leads less than half as far
-            before, nearer = nearer, beyond
+            before, nearer = nearer, new
             if before is not None and 2.0 * (before.arclength - point.arclength) < taken <= self.stepping.max_step:
-                return before, self.stepping.initial_step, 0.0, self._angle(point, before)
+                return before, 0.0, _angle(point, before)
         raise failure
-
-    @staticmethod
-    def _leads_on(point: CurvePoint, new: CurvePoint) -> bool:
-        """Whether the tangent at the second of two points leads away from the first: not at a jump across a corner,
-        onto the part of the curve behind it, which would be followed back into it.
-        """
-        chord = new.weights * (new.u - point.u)
-        return float(chord @ (new.weights * new.tangent)) > 0.0
-
-    @staticmethod
-    def _angle(a: CurvePoint, b: CurvePoint) -> float:
-        return math.acos(min(1.0, max(-1.0, cosine(a.tangent, b.tangent, b.weights))))
 
     def _next_step(self, new: CurvePoint, step: float, deviation: float, turn: float) -> float:
         options = self.stepping
@@ -321,9 +361,9 @@ class March:
         return min(0.98 * options.max_step, max(step, options.min_step))
 
 
-def _missing(solved: Solved) -> Array:
-    """What is left of the equations at a solved point, and nothing of its row."""
-    return np.append(solved.evaluation.residual, 0.0)
+def _angle(a: CurvePoint, b: CurvePoint) -> float:
+    """Angle between the tangents of two points, radians."""
+    return math.acos(min(1.0, max(-1.0, cosine(a.tangent, b.tangent, b.weights))))
 
 
 @kernel()

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -83,6 +84,7 @@ class Solved:
     distance: float
 
 
+@lru_cache(maxsize=16)
 def closely(options: NewtonOptions) -> NewtonOptions:
     """The same for points that are wanted about as exactly as rounding allows."""
     return replace(options, tolerance=min(options.tolerance, max(_SHARE * options.tolerance, _LEAST)))

@@ -24,11 +24,10 @@ from typing import Any
 import numpy as np
 
 from suboctave.continuation.linear import length
-from suboctave.continuation.march import March
+from suboctave.continuation.march import March, SteppingOptions
 from suboctave.continuation.newton import NewtonOptions, correct, null_row
 from suboctave.continuation.point import CurvePoint, make_point
 from suboctave.continuation.problem import Array
-from suboctave.continuation.stepping import SteppingOptions
 from suboctave.curves.motion import MotionEvaluation, MotionProblem
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.assembly import apply_blocks, block_diagonal
