@@ -20,13 +20,13 @@ from suboctave.errors import ConvergenceError, InputError, check_numbers
 from suboctave.interruption import check_time
 
 #: correction in scaled arclength below which the Jacobian is not computed anew
-SHORT = 1e-3
+_SHORT = 1e-3
 #: correction, in units of motions and ranges, that leads away from a guess of a square system; corrections of one after
-#: which the rate counts
+#: which the rate counts: where two solutions are about to merge the first tell little
 _FAR, _TELLING = 4.0, 3
 #: rate at which corrections shrink, twice in succession, that comes to nothing: at a corner of the equations Newton's
 #: method goes to and fro between its sides
-STALLED = 0.8
+_STALLED = 0.8
 #: correction in scaled arclength that rounding of the unknowns makes
 _ROUNDING = 1e-13
 #: share of the tolerance that `closely` leaves, and its least
@@ -99,11 +99,6 @@ def factorised(evaluation: Evaluation, row: Array | None, weights: Array) -> Fac
     return Factor.of(scaled, overwrite=True)
 
 
-def _takes_over(evaluation: Evaluation, other: Evaluation) -> bool:
-    take: Callable[[Evaluation], bool] | None = getattr(evaluation, "takes_over", None)
-    return take is not None and take(other)
-
-
 def correct(
     curve: Problem,
     guess: Array,
@@ -127,10 +122,7 @@ def correct(
         Way in scaled arclength within which the derivatives of an iterate count as those of the point, if the
         evaluation can keep them.
 
-    Raises
-    ------
-    ConvergenceError
-        If the iterations do not contract or run out.
+    Raises ConvergenceError if the iterations do not contract or run out.
     """
     plane = np.eye(1, len(guess), row)[0] if isinstance(row, int) else row
     u, last, factor = guess.copy(), None, known
@@ -146,20 +138,22 @@ def correct(
         left = previous if options.rounding and contraction == 0.0 else previous * min(contraction, 1.0)
         settled = min(previous, left) <= options.correction
         if error <= options.tolerance and (settled or (iteration == 0 and known is None)):
-            if factor is None or last is None or way > spare or not _takes_over(evaluation, last):
+            takes_over: Callable[[Evaluation], bool] | None = getattr(evaluation, "takes_over", None)
+            if factor is None or last is None or way > spare or takes_over is None or not takes_over(last):
                 factor = factorised(evaluation, plane, weights)
             return Solved(u, evaluation, weights, factor, iteration, distance(u, guess, weights))
         if iteration == options.iterations:
             break
         # after a short step that contracts, the old factors take the next one as far; where that is not far enough, new
         # ones are those of the point as well
-        stale = previous > SHORT or contraction > 0.1 or (spare > 0.0 and 2.0 * error**2 > options.tolerance * before)
+        stale = previous > _SHORT or contraction > 0.1 or (spare > 0.0 and 2.0 * error**2 > options.tolerance * before)
         if factor is None or (iteration > 0 and stale):
             factor = factorised(evaluation, plane, weights)
             last, way = evaluation, 0.0
         if factor.singular:
             raise ConvergenceError(f"the equations are singular at {curve.where(u)}")
-        step = factor.solve(_right_side(evaluation, plane, weights * (u - guess)))
+        rhs = evaluation.residual
+        step = factor.solve(rhs if plane is None else np.append(rhs, plane.dot(weights * (u - guess))))
         if isinstance(row, int):
             step[row] = 0.0  # but for rounding of the factors it is
         still = options.rounding and previous <= options.correction and length(step) <= _ROUNDING
@@ -172,33 +166,18 @@ def correct(
             first = size
         else:
             rate, contraction = contraction, size / previous if previous > 0.0 else 0.0
-            lost = (contraction > 2.0 and size > first) or min(rate, contraction) > STALLED
-            lost = lost if plane is not None else _leads_away(iteration, size, contraction, previous)
+            lost = (contraction > 2.0 and size > first) or min(rate, contraction) > _STALLED
+            if plane is None:
+                lost = size > _FAR or (iteration > _TELLING and contraction > 0.5 and previous > _SHORT**2)
             if lost and not options.damped and nearest is None:
                 break
         previous = size if share == 1.0 else math.inf
     if nearest is not None:
         return nearest
+    where = curve.where(guess)
     raise ConvergenceError(
-        f"Newton's method did not converge near {curve.where(guess)} "
-        f"(residual {error:.1e} after {iteration} iterations)"
+        f"Newton's method did not converge near {where} (residual {error:.1e} after {iteration} iterations)"
     )
-
-
-def _right_side(evaluation: Evaluation, row: Array | None, away: Array) -> Array:
-    """What a correction is solved for, `away` from the guess in scaled variables."""
-    if row is None:
-        return evaluation.residual
-    rhs = np.empty(len(away))
-    rhs[:-1], rhs[-1] = evaluation.residual, row.dot(away)
-    return rhs
-
-
-def _leads_away(iteration: int, size: float, contraction: float, previous: float) -> bool:
-    """Whether corrections of a square system come to nothing: far from a curve, and where two solutions are about to
-    merge, the first tell little.
-    """
-    return size > _FAR or (iteration > _TELLING and contraction > 0.5 and previous > SHORT**2)
 
 
 def _decrease(curve: Problem, u: Array, step: Array, error: float) -> float:
