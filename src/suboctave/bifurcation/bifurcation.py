@@ -178,8 +178,11 @@ class Bifurcation:
         if self.kind == "NS" and self.kappa == 0.0:  # only bracketed: the complex pair nearest to the circle
             pairs = mu[mu.imag > 0.0]
             return complex(min(pairs if pairs.size else mu, key=lambda m: abs(abs(m) - 1.0)))
-        target = target_multiplier(self.kind, self.kappa * self.orbit.period)
+        target = self._target()
         return complex(mu[0] if target is None else min(mu, key=lambda m: abs(m - target)))
+
+    def _target(self) -> complex | None:
+        return target_multiplier(self.kind, self.kappa * self.orbit.period)
 
     def remark(self) -> str:
         """What a table says beside the numbers: the contact that grazes, and what is not resolved."""
@@ -315,13 +318,10 @@ class TrackedEvent(Bifurcation):
         """False: events are located along curves, not behind a grazing."""
         return False
 
-    def critical_multiplier(self) -> complex:
-        """The multiplier on the unit circle that the curve's bifurcations have."""
+    def _target(self) -> complex | None:
         if self.kind in TRACKED_KINDS:
-            return super().critical_multiplier()
-        mu, target = self.multipliers, target_multiplier(self.curve, self.kappa * self.orbit.period)
-        target = _AT_ENDS.get(self.kind, target)
-        return complex(mu[0] if target is None else min(mu, key=lambda m: abs(m - target)))
+            return super()._target()
+        return _AT_ENDS.get(self.kind, target_multiplier(self.curve, self.kappa * self.orbit.period))
 
     def remark(self) -> str:
         """What a table says beside the numbers."""

@@ -79,21 +79,17 @@ def contact_side(local: LocalMotion, index: int) -> int:
     if isinstance(kind, PiecewiseLinear):
         piece = kind.pieces[index]
         return piece.side if local.coefficients[piece.stiffness] >= 0.0 else -piece.side
+    level = levels(local)[index]
     if isinstance(kind, CornerSampling):
-        return _stiffer_side(local, levels(local)[index])
+        # the side on which the force is stiffer, all other states at rest
+        law, near = as_coupled(local.element), 1e-3 * (float(np.abs(local.motion).max()) or 1.0)
+        q = np.zeros((2 * law.count if local.element.depends_on_velocity else law.count, 2))
+        q[0] = level - near, level + near
+        below, above = law.tangent(q, np.zeros(2), local.coefficients)[1][0]
+        return -1 if _along(local.element) * (above - below) < 0.0 else 1
     assert isinstance(local.element, Element)
-    point = np.array([levels(local)[index]])
-    return -1 if float(local.element.curvature(point, np.zeros(1), local.coefficients)[0][0]) < 0.0 else 1
-
-
-def _stiffer_side(local: LocalMotion, level: float) -> int:
-    """The side of a corner on which the force is stiffer, all other states at rest."""
-    law = as_coupled(local.element)
-    near = 1e-3 * (float(np.abs(local.motion).max()) or 1.0)
-    q = np.zeros((2 * law.count if local.element.depends_on_velocity else law.count, 2))
-    q[0] = level - near, level + near
-    below, above = law.tangent(q, np.zeros(2), local.coefficients)[1][0]
-    return -1 if _along(local.element) * (above - below) < 0.0 else 1
+    bend = local.element.curvature(np.array([level]), np.zeros(1), local.coefficients)[0]
+    return -1 if float(bend[0]) < 0.0 else 1
 
 
 def _along(element: BaseElement) -> float:
@@ -125,10 +121,7 @@ def rests_in_corner(state: BalanceState) -> bool:
 
 
 #: what happens along a curve, and what happens the other way round
-_BACKWARDS = {
-    "begins to touch": "ceases to touch",
-    "begins to lift off": "ceases to lift off",
-}
+_BACKWARDS = {"begins to touch": "ceases to touch", "begins to lift off": "ceases to lift off"}
 _BACKWARDS |= {there: here for here, there in _BACKWARDS.items()}
 
 
@@ -180,10 +173,9 @@ def read_direction(state: BalanceState, element: int) -> Array:
 def basis_rows(high: int, tau: float) -> tuple[Array, Array, Array]:
     """Basis functions at an instant and their first two derivatives by tau, shape (2 H + 1,) each."""
     k = np.arange(1.0, high + 1.0)
-    value, slope, curve = np.empty(2 * len(k) + 1), np.empty(2 * len(k) + 1), np.empty(2 * len(k) + 1)
     c, s = np.cos(k * tau), np.sin(k * tau)
-    value[0], slope[0], curve[0] = 1.0, 0.0, 0.0
-    value[1::2], value[2::2] = c, s
+    value, slope, curve = np.zeros((3, 2 * high + 1))
+    value[0], value[1::2], value[2::2] = 1.0, c, s
     slope[1::2], slope[2::2] = -k * s, k * c
     curve[1::2], curve[2::2] = -(k**2) * c, -(k**2) * s
     return value, slope, curve

@@ -17,10 +17,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from suboctave.continuation.linear import Factor
 from suboctave.floquet.result import FloquetResult
 from suboctave.harmonic.basis import Array
-from suboctave.harmonic.evaluation import BalanceState
 
 
 def measured(tangent: Array, weights: Array, parameter: int, result: FloquetResult) -> Array:
@@ -64,13 +62,3 @@ def in_doubt(result: FloquetResult, integer: float, half: float) -> FloquetResul
     for which, distance in contradictions:
         errors[which] = max(errors[which], 2.0 * distance)
     return replace(result, errors=errors)
-
-
-def fold_sign(state: BalanceState) -> float:
-    """Sign of det J_0."""
-    return Factor.of(state.jacobian).sign
-
-
-def half_sign(state: BalanceState) -> float:
-    """Sign of det J_half."""
-    return Factor.of(state.half_jacobian).sign

@@ -60,9 +60,8 @@ from suboctave.harmonic.perturbation import Kind, bilinear_gradient, operator
 from suboctave.harmonic.trigonometric import wave_sums
 from suboctave.harmonic.waves import Frequencies, Waves
 
-SUPERCRITICAL, SUBCRITICAL = "supercritical", "subcritical"
 #: share of the terms that add up to it below which a number counts as zero whatever its estimated error
-ROUNDING = 1e-9
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -126,11 +125,9 @@ def with_criticality(form: NormalForm) -> NormalForm:
         ("c3", "cubic coefficient zero within its error"),
     ):
         value, error = form.coefficients.get(key), form.errors.get(key)
-        if value is None or error is None:
-            continue
-        if not abs(value) > error:
+        if value is not None and error is not None and not abs(value) > error:
             return replace(form, criticality=None, remark=words)
-    return replace(form, criticality=SUPERCRITICAL if form.coefficients["c3"] < 0.0 else SUBCRITICAL)
+    return replace(form, criticality="supercritical" if form["c3"] < 0.0 else "subcritical")
 
 
 def unweighted(state: BalanceState, vector: np.ndarray) -> np.ndarray:
@@ -162,9 +159,9 @@ class Expansion:
         """For one of the two real operators."""
         phi, psi = unweighted(state, vectors.right), unweighted(state, vectors.left)
         slope = bilinear_gradient(state, kind, psi, phi, (name,))
-        g, size = float((1j * slope.kappa).real), growth_size(state, kind, psi, phi)
+        g, size = float((1j * slope.kappa).real), _growth_size(state, kind, psi, phi)
         # without damping g is rounding, and the parameter tells the sense
-        certain = abs(g) > ROUNDING * size
+        certain = abs(g) > _ROUNDING * size
         turn = -1.0 if (g if certain else slope.rates[name].real) < 0.0 else 1.0
         by_parameter = turn * slope.rates[name].real
         return cls(state, kind, phi, turn * psi, turn * g, size, turn * slope.x, by_parameter, Multilinear(state))
@@ -186,6 +183,24 @@ class Expansion:
         third = self.forms.third(phi, phi, phi, Frequencies.of(self.state, self.kind)).vector(self.kind)
         pure = float(self.psi @ third) / 6.0
         return mixed + pure, abs(mixed) + abs(pure)
+
+
+def _growth_size(state: BalanceState, kind: Kind, psi: np.ndarray, phi: np.ndarray) -> float:
+    """Sum of the moduli of the terms of `psi.dJ/dkappa phi`, frequency by frequency."""
+    left, right = Waves.of(state, kind, psi), Waves.of(state, kind, phi)
+    frequency = right.at.values * state.rate
+    slope = np.einsum("fij,fj->fi", state.linear.stiffness(frequency, 1), right.amplitudes)
+    compliance, change = state.linear.compliance(frequency), state.linear.compliance(frequency, 1)
+    if compliance is not None and change is not None:
+        # at a null vector the elements answer with the forces that balance A phi
+        force = np.einsum("fij,fj->fi", state.linear.stiffness(frequency), right.amplitudes)
+        force = np.linalg.solve(compliance, force[..., None])[..., 0]
+        slope = slope - np.einsum("fij,fj->fi", change, force)
+    return float(np.abs(left.amplitudes.conj() * slope).sum())
+
+
+def _ratio(over: float, under: float) -> float:
+    return over / under if under else math.nan
 
 
 def limit_point(state: BalanceState, vectors: NullVectors, name: str, kappa: float) -> Terms:
@@ -218,24 +233,6 @@ def cubic_coefficient(
     return own.cubic(block.solve(-0.5 * own.squared()) / weights)[0]
 
 
-def growth_size(state: BalanceState, kind: Kind, psi: np.ndarray, phi: np.ndarray, kappa: float = 0.0) -> float:
-    """Sum of the moduli of the terms of `psi.dJ/dkappa phi`, frequency by frequency."""
-    left, right = (Waves.of(state, kind, one, kappa) for one in (psi, phi))
-    frequency = right.at.values * state.rate
-    slope = np.einsum("fij,fj->fi", state.linear.stiffness(frequency, 1), right.amplitudes)
-    compliance, change = state.linear.compliance(frequency), state.linear.compliance(frequency, 1)
-    if compliance is not None and change is not None:
-        # at a null vector the elements answer with the forces that balance A phi
-        force = np.einsum("fij,fj->fi", state.linear.stiffness(frequency), right.amplitudes)
-        force = np.linalg.solve(compliance, force[..., None])[..., 0]
-        slope = slope - np.einsum("fij,fj->fi", change, force)
-    return float(np.abs(left.amplitudes.conj() * slope).sum())
-
-
-def _ratio(over: float, under: float) -> float:
-    return over / under if under else float("nan")
-
-
 #: share of its terms' size below which c counts as zero: a branch point is located to about 1e-8 of its symmetry
 _SYMMETRIC = 1e-6
 
@@ -256,7 +253,7 @@ def branch_point(state: BalanceState, vectors: NullVectors, name: str, kappa: fl
     squared = own.squared()
     c = float(own.psi @ squared)
     c3, cubic_size = own.cubic(solve(-0.5 * squared))
-    coefficients = {"a": a, "b": b, "c": c, "g": own.g, "c3": c3, "curvature": -c3 / b if b else float("nan")}
+    coefficients = {"a": a, "b": b, "c": c, "g": own.g, "c3": c3, "curvature": _ratio(-c3, b)}
     # or a share of what c3 amounts to where the branches are as far apart as the parameter is from zero: at rest, which
     # is located as well as rounding allows, c may have no other size
     parameter = abs(state.omega if name == "omega" else state.values[name])
@@ -309,7 +306,7 @@ def torus(state: BalanceState, vectors: NullVectors, name: str, kappa: float) ->
         "d": d.real,
         "c3_frequency": c3.imag,
         "d_frequency": d.imag,
-        "curvature": -c3.real / d.real if d.real else float("nan"),
+        "curvature": _ratio(-c3.real, d.real),
     }
     return Terms(coefficients, {"c3": float(np.abs(parts).sum() / abs(g))}, 1.0)
 
@@ -326,14 +323,12 @@ def _beside_resonance(form: NormalForm, share: float) -> NormalForm:
     return replace(form, remark=words, criticality=None)
 
 
-# ------------------------------------------------------------------------------------------------------------ forms
-#: the kinds that have one, and the operators that are singular there
-FORMS = {"LP": Kind.INTEGER, "BP": Kind.INTEGER, "PD": Kind.HALF, "NS": Kind.FREE}
-_TERMS: dict[str, Callable[[BalanceState, NullVectors, str, float], Terms]] = {
-    "LP": limit_point,
-    "PD": period_doubling,
-    "BP": branch_point,
-    "NS": torus,
+#: the kinds that have a form: the operator that is singular there, and the terms
+FORMS: dict[str, tuple[Kind, Callable[[BalanceState, NullVectors, str, float], Terms]]] = {
+    "LP": (Kind.INTEGER, limit_point),
+    "PD": (Kind.HALF, period_doubling),
+    "BP": (Kind.INTEGER, branch_point),
+    "NS": (Kind.FREE, torus),
 }
 
 
@@ -348,12 +343,12 @@ def normal_form(kind: str, state: BalanceState, vectors: NullVectors, name: str,
     known = ["omega", *state.values]
     if name not in known:
         raise InputError(f"unknown parameter {name!r}{suggest(name, known)}")
-    terms = _TERMS[kind]
+    operator_kind, terms = FORMS[kind]
     whole = terms(state, vectors, name, kappa)
-    errors = {key: ROUNDING * size for key, size in whole.sizes.items()}
+    errors = {key: _ROUNDING * size for key, size in whole.sizes.items()}
     # harmonics left out matter like 1 / H where a contact is hard; two numbers, as a single change may vanish by chance
     for high, missing in ((2 * state.basis.harmonics // 3, 2.0), (state.basis.harmonics // 2, 1.0)):
-        coarse = _coarser(state, vectors, FORMS[kind], kappa, high)
+        coarse = _coarser(state, vectors, operator_kind, kappa, high)
         if coarse is None:
             continue
         other = terms(*coarse, name, kappa)

@@ -111,7 +111,7 @@ class Sample:
     @lazy
     def half_sign(self) -> float:
         """Sign of det J_half."""
-        return measures.half_sign(self.state)
+        return Factor.of(self.state.half_jacobian).sign
 
     @lazy
     def gaps(self) -> tuple[GapExtrema, ...]:

@@ -15,8 +15,9 @@ from itertools import groupby
 import numpy as np
 
 from suboctave.bifurcation.bifurcation import CONTACT_KINDS, Bifurcation
-from suboctave.bifurcation.measures import fold_sign, half_sign, in_doubt
+from suboctave.bifurcation.measures import in_doubt
 from suboctave.continuation.ending import Ending
+from suboctave.continuation.linear import Factor
 from suboctave.curves.audit import Unsettled, joined
 from suboctave.curves.points import BranchPoint
 from suboctave.curves.trace import Trace
@@ -86,7 +87,10 @@ class _Asking:
     def settled(self, state: BalanceState, result: FloquetResult) -> FloquetResult:
         """The verdict where one is open, with witnesses."""
         return self._answer(
-            lambda: in_doubt(self.method.settled(state, result), fold_sign(state), half_sign(state)), result
+            lambda: in_doubt(
+                self.method.settled(state, result), Factor.of(state.jacobian).sign, Factor.of(state.half_jacobian).sign
+            ),
+            result,
         )
 
     def along(self, state: BalanceState, result: FloquetResult) -> FloquetResult:
