@@ -20,7 +20,6 @@ class LoadSpectrum:
 
     def __init__(self, system: System, basis: HarmonicBasis, shapes: list[Array]) -> None:
         self.basis = basis
-        self.size = len(shapes[0]) if shapes else 0
         self.components = list(zip(system.load_components(), shapes, strict=True))
         #: of those with a constant phase
         self._units = [_unit(c, {}) if c.phase.constant else None for c, _ in self.components]
@@ -61,19 +60,17 @@ def _unit(component, values: Mapping[str, float]) -> complex:
 
 def _wave_derivative(component, values: Mapping[str, float], names: tuple[str, ...]) -> complex:
     """Derivative of `a exp(i phase)` by one or two names (product and chain rule)."""
-    unit = _unit(component, values)
-    a = component.amplitude
+    unit, a, phi = _unit(component, values), component.amplitude, component.phase
 
     def d(coefficient, *by: str) -> float:
         for name in by:
             coefficient = coefficient.derivative(name)
         return coefficient.value(values)
 
-    phi = component.phase
     if len(names) == 1:
         (x,) = names
-        return unit * (d(a, x) + (1j * a.value(values) * d(phi, x) if x in phi.names else 0.0))
+        return unit * (d(a, x) + (1j * d(a) * d(phi, x) if x in phi.names else 0.0))
     x, y = names
-    total = d(a, x, y) + 1j * a.value(values) * d(phi, x, y) - a.value(values) * d(phi, x) * d(phi, y)
+    total = d(a, x, y) + 1j * d(a) * d(phi, x, y) - d(a) * d(phi, x) * d(phi, y)
     total += sum(1j * d(a, p) * d(phi, q) for p, q in itertools.permutations((x, y)))
     return unit * total

@@ -69,29 +69,26 @@ def motion_size(state: BalanceState) -> float:
 
 def truncation(state: BalanceState) -> float:
     """Estimated size of the neglected harmonics relative to the motion."""
-    tail, size = state.tails
-    if size == 0.0:
-        return 0.0
-    return float(tail[state.basis.harmonics])
+    return float(state.tails[0][state.basis.harmonics])
 
 
-def _ladder(options: AdaptiveHarmonics, state: BalanceState) -> tuple[int, ...]:
-    """Numbers of harmonics of omega to choose from."""
-    basis = state.basis
-    return _rungs(options, basis.harmonics, basis.nu, state.balance.size, state.balance.highest_load)
+def _limits(options: AdaptiveHarmonics, state: BalanceState) -> tuple[int, float]:
+    """Fewest and most harmonics of omega that may be chosen."""
+    basis, balance = state.basis, state.balance
+    affordable = (_MOST_UNKNOWNS / balance.size - 1) / (2 * basis.nu)
+    return max(options.minimum, balance.highest_load), max(basis.harmonics / basis.nu, min(options.maximum, affordable))
 
 
 @lru_cache(maxsize=256)
-def _rungs(options: AdaptiveHarmonics, high: int, nu: int, size: int, highest_load: int) -> tuple[int, ...]:
-    lowest = max(options.minimum, highest_load)
-    most = max(high / nu, min(options.maximum, (_MOST_UNKNOWNS / size - 1) / (2 * nu)))
-    return tuple(h for h in _LADDER if lowest <= h <= most) or (max(lowest, high // nu),)
+def _rungs(lowest: int, most: float, otherwise: int) -> tuple[int, ...]:
+    """Numbers of harmonics of omega to choose from."""
+    return tuple(h for h in _LADDER if lowest <= h <= most) or (max(lowest, otherwise),)
 
 
 def next_harmonics(state: BalanceState, options: AdaptiveHarmonics) -> HarmonicBasis:
     """A basis with half as many harmonics again, where the options allow it, else the present ones."""
     nu, high = state.basis.nu, state.basis.harmonics
-    wanted = next((h for h in _ladder(options, state) if h * nu >= 1.5 * high), None)
+    wanted = next((h for h in _rungs(*_limits(options, state), high // nu) if h * nu >= 1.5 * high), None)
     return state.basis if wanted is None else HarmonicBasis(wanted * nu, nu)
 
 
@@ -120,7 +117,7 @@ def choose_harmonics(state: BalanceState, options: AdaptiveHarmonics, tolerance:
     tail, size = state.tails
     if size == 0.0:
         return basis
-    ladder = _ladder(options, state)
+    ladder = _rungs(*_limits(options, state), high)
 
     def sufficient(bound: float) -> int:
         for h in ladder:
@@ -140,9 +137,9 @@ def choose_harmonics(state: BalanceState, options: AdaptiveHarmonics, tolerance:
 
 
 @lru_cache(maxsize=256)
-def _fine_rungs(nu: int, lowest: float, most: float) -> tuple[int, ...]:
+def _fine_rungs(nu: int, lowest: int, most: float, high: int) -> tuple[int, ...]:
     rungs = sorted({round(nu * _LADDER[0] * _FINER**i) for i in range(100)})
-    return tuple(r for r in rungs if lowest <= r <= most)
+    return tuple(r for r in rungs if lowest * nu <= r <= most * nu) or (max(lowest * nu, high),)
 
 
 def _of_subharmonics(state: BalanceState, options: AdaptiveHarmonics, tolerance: float) -> HarmonicBasis:
@@ -152,16 +149,13 @@ def _of_subharmonics(state: BalanceState, options: AdaptiveHarmonics, tolerance:
     if beyond is None:
         return basis
     total = np.sqrt(np.sum(beyond**2, axis=0))
-    lowest = max(options.minimum, state.balance.highest_load)
-    most = max(high / nu, min(options.maximum, (_MOST_UNKNOWNS / state.balance.size - 1) / (2 * nu)))
-    rungs = _fine_rungs(nu, lowest * nu, most * nu) or (max(lowest * nu, high),)
-    if total[high] > tolerance:
-        wanted = _needed(beyond, total, high, _AIM * tolerance, rungs)
-        return HarmonicBasis(wanted, nu) if wanted > high else basis
-    if total[int(0.9 * high)] > _AIM * tolerance:
+    rungs = _fine_rungs(nu, *_limits(options, state), high)
+    lacking = total[high] > tolerance
+    if not lacking and total[int(0.9 * high)] > _AIM * tolerance:
         return basis
     wanted = _needed(beyond, total, high, _AIM * tolerance, rungs)
-    return HarmonicBasis(wanted, nu) if 2 * wanted + 1 < 0.9 * basis.size else basis
+    better = wanted > high if lacking else 2 * wanted + 1 < 0.9 * basis.size
+    return HarmonicBasis(wanted, nu) if better else basis
 
 
 def _class_tails(state: BalanceState) -> Array | None:
