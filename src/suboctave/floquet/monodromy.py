@@ -426,14 +426,10 @@ _TOGETHER = 3.0
 _MOST_TURNS = 1e15
 
 
-def floquet_multipliers(state: BalanceState, corrected: bool = True) -> FloquetResult:
-    """Multipliers, error estimates and verdict of a solved motion, over the motion's own period (`nu` load periods).
-
-    corrected
-        False: along the motion as it stands, as if it were exact; errors are then those of the propagation alone.
-    """
+def floquet_multipliers(state: BalanceState) -> FloquetResult:
+    """Multipliers, error estimates and verdict of a solved motion, over the motion's own period (`nu` load periods)."""
     check_time()
-    motion = _Motion(Linearised(state), corrected)
+    motion = _Motion(Linearised(state))
     if not np.isfinite(motion.before).all():
         return _no_numbers(state, motion.along.size)
     mu, shift, share = motion.multipliers(1.0)
@@ -483,10 +479,10 @@ class _Motion:
         Monodromy matrix along the motion as it stands, (2 n, 2 n).
     """
 
-    def __init__(self, along: Linearised, corrected: bool) -> None:
+    def __init__(self, along: Linearised) -> None:
         self.along = along
         self.before, start, self._nodes = along.standing()
-        self._start = start if corrected and len(self._nodes) and len(along.active) else None
+        self._start = start if len(self._nodes) and len(along.active) else None
 
     def multipliers(self, weight: float) -> tuple[ComplexArray, Array, float]:
         """Multipliers, how far the correction has moved them, and the share of it that was taken.
