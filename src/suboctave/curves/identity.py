@@ -64,14 +64,14 @@ class Point(Protocol):
         ...
 
 
-def relation(one: PeriodicOrbit, other: PeriodicOrbit, tolerance: float = TOLERANCE) -> Relation:
+def relation(one: PeriodicOrbit, other: PeriodicOrbit) -> Relation:
     """What a motion is to another of the same system at the same frequency and parameters.
 
     Mirrored: an image under a change of signs of DOFs and a shift by half periods of the load (see the module).
     Permutations of identical masses are not among them: such images are others.
     """
     nu, a, b = _together(one, other)
-    room = (tolerance * _size(a, b)) ** 2
+    room = (TOLERANCE * _size(a, b)) ** 2
     images = a * _turns(len(a), nu)
     plus, minus = (np.sum(np.abs(images - sign * b) ** 2, axis=1) for sign in (1.0, -1.0))
     off = plus.sum(axis=1)[::2]

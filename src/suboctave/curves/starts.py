@@ -64,9 +64,7 @@ def linear_response(curve: MotionProblem, value: float) -> Array:
     return curve.join(apply_blocks(inverse, load), value)
 
 
-def start_point(
-    curve: MotionProblem, value: float, given: Any, newton: NewtonOptions, largest: float = 0.0
-) -> CurvePoint:
+def start_point(curve: MotionProblem, value: float, given: Any, newton: NewtonOptions) -> CurvePoint:
     """A solved point of the curve at a value of the free parameter, in a basis that suits it.
 
     Parameters
@@ -88,12 +86,12 @@ def start_point(
             curve = curve.with_basis(given.basis)
         guess = _from_given(curve, value, given)
         try:
-            return settled(curve, guess, newton, largest)
+            return settled(curve, guess, newton)
         except ConvergenceError as failure:
             if isinstance(given, PeriodicOrbit):
                 # at a limit point the equations are singular at a fixed parameter: the nearest point of the curve
                 with suppress(ConvergenceError):
-                    return settled(curve, guess, newton, largest, null_row)
+                    return settled(curve, guess, newton, null_row)
             raise ConvergenceError(f"no motion found from the given start at {curve.where(guess)}: {failure}") from None
     patient = replace(newton, iterations=max(newton.iterations, 40), damped=True)
     ways: list[tuple[str, Callable[[], tuple[MotionProblem, Array]]]] = []
@@ -111,7 +109,7 @@ def start_point(
             begun, guess = guess_by()
             begun = curve.with_balance(begun.balance)
             loose = _unheld(begun, guess)
-            return settled(begun, guess, patient, largest)
+            return settled(begun, guess, patient)
         except ConvergenceError as failure:
             reason = str(failure)
             if reason not in tried:
@@ -171,7 +169,6 @@ def settled(
     curve: MotionProblem,
     u: Array,
     newton: NewtonOptions,
-    largest: float = 0.0,
     held: Held = lambda curve, u, weights: curve.parameter,
 ) -> CurvePoint:
     """Solve from a guess, as a rule at its parameter value; again with more harmonics while the motion asks."""
@@ -179,7 +176,7 @@ def settled(
         balance = curve.balance.settle(*curve.split(u))
         if balance is not curve.balance:
             curve = curve.with_balance(balance)
-        weights = curve.weights(u, largest)
+        weights = curve.weights(u, 0.0)
         solved = correct(curve, u, held(curve, u, weights), weights, newton)
         adapted = curve.adapted(solved.u, solved.evaluation)
         if adapted.balance is curve.balance:
