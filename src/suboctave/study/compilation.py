@@ -72,9 +72,9 @@ def run(number: int) -> None:
         COMPUTATIONS[number][1]()
 
 
-def compile_all(report: Report, processes: int = 2) -> None:
+def compile_all(report: Report) -> None:
     """Compile every kernel that is not in the cache; `report(share done, what is left)` is called."""
-    with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
         left = {pool.submit(run, number): name for number, (name, _) in enumerate(COMPUTATIONS)}
         report(0.0, "; ".join(left.values()))
         for future in as_completed(list(left)):

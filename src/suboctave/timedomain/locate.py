@@ -33,6 +33,7 @@ from suboctave.timedomain.trajectory import flow
 __all__ = ["Curve", "CurvePoint", "locate_by_shooting"]
 
 _KINDS = ("LP", "PD", "NS", "BP")
+_CORRECTIONS = 25  # Gauss-Newton steps onto the curve
 _FIRST_STEP = 1e-4  # along the curve, in units of the size of the motion
 _NEARLY_SINGULAR = 1e-5  # relative singular value below which a BP's second direction is left alone
 _NO_BRANCH_POINT = 1e-4
@@ -83,10 +84,10 @@ class Curve:
         slopes[:, :-1] -= np.eye(self.m)
         return final - u[:-1], slopes, transition
 
-    def onto(self, u: Array, along: Array | None, max_iterations: int = 25) -> CurvePoint:
+    def onto(self, u: Array, along: Array | None) -> CurvePoint:
         """The point of the curve nearest to `u`, tangent oriented like `along`."""
         previous = np.inf
-        for _ in range(max_iterations):
+        for _ in range(_CORRECTIONS):
             defect, slopes, transition = self.evaluate(u)
             residual = float(np.max(np.abs(defect)))
             left, size, right = np.linalg.svd(slopes)
@@ -108,7 +109,7 @@ class Curve:
             previous = residual
         raise ConvergenceError(
             f"shooting with free omega did not arrive near omega = {u[-1] * self.model.reference:.9g} (relative "
-            f"residual {residual:.1e} after {max_iterations} steps): start closer, for instance from shoot(...) on the "
+            f"residual {residual:.1e} after {_CORRECTIONS} steps): start closer, for instance from shoot(...) on the "
             "same branch"
         )
 

@@ -254,9 +254,9 @@ class Span:
         low, high = (float(across(end, value)) for end in self.ends)
         return low, high
 
-    def outline(self, count: int = 241) -> tuple[Array, Array, Array]:
+    def outline(self) -> tuple[Array, Array, Array]:
         """Values of s, dense towards both ends, and both ends of the range of q there."""
-        share = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, count))
+        share = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, 241))
         values = self.low + share * (self.high - self.low)
         low, high = (across(end, values) for end in self.ends)
         return values, low, high
