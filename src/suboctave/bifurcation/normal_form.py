@@ -171,6 +171,10 @@ class Expansion:
         """phi as waves."""
         return Waves.of(self.state, self.kind, self.phi)
 
+    def growth(self, along: Array) -> float:
+        """d, from the change of the motion along its branch, (2 H + 1, size)."""
+        return self.by_parameter + float((self.by_motion * along).sum())
+
     def squared(self) -> Array:
         """R''[phi, phi], shape (dimension,)."""
         phi = self.waves
@@ -215,8 +219,7 @@ def period_doubling(state: BalanceState, vectors: NullVectors, name: str, kappa:
     own = Expansion.of(state, Kind.HALF, vectors, name)
     factor = Factor.of(state.jacobian)
     c3, size = own.cubic(factor.solve(-0.5 * own.squared()))
-    along = factor.solve(-state.residual_by(name)).reshape(state.x.shape)
-    d = own.by_parameter + float((own.by_motion * along).sum())
+    d = own.growth(factor.solve(-state.residual_by(name)).reshape(state.x.shape))
     coefficients = {"c3": c3, "d": d, "g": own.g, "curvature": _ratio(-c3, d)}
     return Terms(coefficients, {"c3": size, "g": own.g_size}, own.g_size)
 
@@ -246,11 +249,9 @@ def branch_point(state: BalanceState, vectors: NullVectors, name: str, kappa: fl
         solution: Array = border.factor.solve(np.append(rhs * border.scale, 0.0))[:-1] * border.scale
         return solution
 
-    shape = state.x.shape
-    v = Direction(solve(-state.residual_by(name)).reshape(shape), {name: 1.0})
+    v = Direction(solve(-state.residual_by(name)).reshape(state.x.shape), {name: 1.0})
     a = float(own.psi @ second_derivative(state, v, v))
-    b = own.by_parameter + float((own.by_motion * v.x).sum())
-    squared = own.squared()
+    b, squared = own.growth(v.x), own.squared()
     c = float(own.psi @ squared)
     c3, cubic_size = own.cubic(solve(-0.5 * squared))
     coefficients = {"a": a, "b": b, "c": c, "g": own.g, "c3": c3, "curvature": _ratio(-c3, b)}

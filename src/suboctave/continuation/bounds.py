@@ -33,12 +33,10 @@ class Bounds:
     def passed(self, a: CurvePoint, b: CurvePoint) -> float | None:
         """The bound on or beyond which the second of two neighbours lies and the first does not, or None."""
         before, here = self.value(a), self.value(b)
-        if here >= self.high > before:
+        if here > self.high or here == self.high > before:
             return self.high
-        if here <= self.low < before:
+        if here < self.low or here == self.low < before:
             return self.low
-        if not self.low <= here <= self.high:
-            return self.high if here > self.high else self.low
         return None
 
     def left(self, a: CurvePoint, b: CurvePoint, newton: NewtonOptions) -> CurvePoint | None:

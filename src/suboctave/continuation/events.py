@@ -111,9 +111,9 @@ class Bracket:
         for low, high in pairwise(sorted(self.values)):
             if self.values[low] * self.values[high] <= 0.0:
                 least, most = sorted((abs(self.values[low]), abs(self.values[high])))
-                uneven = 0.0 < _LARGE * least < most
+                unit = least if 0.0 < _LARGE * least < most else 0.0
 
-                def scaled(share: float, unit: float = least if uneven else 0.0) -> float:
+                def scaled(share: float, unit: float = unit) -> float:
                     value = self.value(share)
                     value = 0.0 if abs(value) < little else value
                     return math.asinh(value / unit) if unit else value
