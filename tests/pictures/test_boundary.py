@@ -10,10 +10,9 @@ import pytest
 
 from suboctave.errors import InputError
 from suboctave.pictures import plot, plot_boundaries, plot_space, style
-from suboctave.pictures.boundary import boundary_drawing
+from suboctave.pictures.boundary import boundary_drawing, space_drawing
 from suboctave.pictures.browser import SYMBOLS, figure_data
 from suboctave.pictures.report import write_report
-from suboctave.pictures.space import space_drawing
 from suboctave.pictures.style import period_colour
 from suboctave.store.layout import EventRow, curve_dataset
 

@@ -10,11 +10,10 @@ import pytest
 
 from suboctave.errors import InputError
 from suboctave.pictures import plot, plot_boundaries, plot_space
-from suboctave.pictures.boundary import boundary_drawing
+from suboctave.pictures.boundary import boundary_drawing, space_drawing
 from suboctave.pictures.browser import figure_data
-from suboctave.pictures.isolas import surface
 from suboctave.pictures.report import write_report
-from suboctave.pictures.space import space_drawing
+from suboctave.pictures.strokes import surface
 from suboctave.pictures.style import period_colour, tinted
 from suboctave.store.layout import EventRow, curve_dataset, isolas_dataset
 

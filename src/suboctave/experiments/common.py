@@ -285,7 +285,7 @@ class TimeResult(Stored):
         """Draw it; saved if a path is given. The class says what is drawn, and which options there are."""
         from suboctave.pictures import in_time
 
-        return getattr(in_time, self.picture)(self.to_xarray(), path, **options)
+        return getattr(in_time, self.picture)(self.to_xarray(), path=path, **options)
 
     def to_xarray(self) -> xarray.Dataset:
         """The result as a labelled dataset, with what produced it (variables: docs/results.md)."""

@@ -5,13 +5,12 @@ from suboctave.pictures import plot
 plot(curve.to_xarray(), "curve.png")
 """
 
-from suboctave.pictures.boundary import plot_boundaries
+from suboctave.pictures.boundary import plot_boundaries, plot_space
 from suboctave.pictures.motions import plot_history, plot_phase, plot_spectrum
 from suboctave.pictures.options import View
 from suboctave.pictures.paper import save_figure
 from suboctave.pictures.report import write_report
 from suboctave.pictures.response import draw_response, plot, plot_panels, plot_response
-from suboctave.pictures.space import plot_space
 
 __all__ = [
     "View",

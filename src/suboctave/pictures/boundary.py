@@ -1,25 +1,31 @@
-"""Curves of bifurcations in the plane of their two parameters: which side of a boundary a design lies on.
+"""Curves of bifurcations: which side of a boundary a design lies on; and the regions and surfaces of isolas.
 
-Solid where the boundary is one of stable motions (all multipliers but the critical one inside the unit circle), dashed
-where motions on both sides are unstable; extrema and points of codimension two marked and named.
+In the plane of their two parameters they are solid where the boundary is one of stable motions (all multipliers but the
+critical one inside the unit circle), dashed where motions on both sides are unstable; extrema and points of codimension
+two marked and named. Lines of period doublings and limit points have the colour of the period whose motions are born or
+end there, so that what is blue borders motions of period 2T; the other kinds, across which no period begins, have
+colours of their own. The kind is shown by shape as well, by small marks along the line: those of its kind in response
+curves, hollow where period doublings are subcritical.
 
-Lines of period doublings and limit points have the colour of the period whose motions are born or end there, so that
-what is blue borders motions of period 2T; the other kinds, across which no period begins, have colours of their own.
-The kind is shown by shape as well, by small marks along the line: those of its kind in response curves, hollow where
-period doublings are subcritical.
+In space they run through response curves at several values of a parameter: frequency to the right, the parameter into
+the depth, amplitude upwards; the curves of bifurcations once more, thin, as their projection on the floor, which is
+their picture in the plane.
+
+Isolas are drawn from the dataset that `suboctave.store.layout` describes, given among those of the curves.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
 from suboctave.errors import InputError, suggest
 from suboctave.kinds import KINDS
-from suboctave.pictures import style
+from suboctave.options import with_options
+from suboctave.pictures import strokes, style
 from suboctave.pictures.drawing import (
     Axis,
     Beads,
@@ -28,24 +34,15 @@ from suboctave.pictures.drawing import (
     Frame,
     Label,
     Markers,
-    event_rank,
+    Region,
+    Surface,
     plain,
 )
-from suboctave.pictures.isolas import CENTRE, MERGING, end_text, shade, split, with_ends
-from suboctave.pictures.options import Coordinates, View
+from suboctave.pictures.options import Coordinates, SpaceOptions, View
 from suboctave.pictures.paper import figure_of
-from suboctave.pictures.strokes import (
-    Line,
-    add_strokes,
-    check_count,
-    checked,
-    differing,
-    events_of,
-    fixed_parameters,
-    line_through,
-    named_axis,
-)
+from suboctave.pictures.strokes import add_strokes, checked, events_of, line_through, named_axis, seen_as
 from suboctave.pictures.style import Mark, Pen, period_colour, period_name, period_of, places_among, tinted
+from suboctave.store.layout import coordinate
 
 if TYPE_CHECKING:
     import xarray
@@ -59,8 +56,8 @@ SUBCRITICAL = "subcritical"
 SMALL = 0.55
 #: so many extrema are named by their values
 _NAMED = 4
-#: share of the axes beyond what is drawn
-_MARGIN = 0.06
+#: share of the axes beyond what is drawn, in the plane and in space
+_MARGIN, _MARGIN_IN_SPACE = 0.06, 0.04
 #: share of white in the colours of those of kinds with a colour of their own, for motions of several periods
 _STAGE = 0.4
 #: of the second and third curve of one kind and period: share of white, width
@@ -114,13 +111,19 @@ def boundary_drawing(
 ) -> Drawing:
     """Curves of bifurcations laid out over the plane of two parameters, with the regions of isolas behind."""
     given, heads = split(curves)
-    group = [with_ends(dataset, heads) for dataset in _checked(given)]
+    if not all(is_boundary(dataset) for dataset in checked(given)):
+        raise InputError("this is no curve of bifurcations; plot draws responses, plot_space both together")
+    group = [with_ends(dataset, heads) for dataset in given]
     if projected and y is not None:
         raise InputError("y= names a parameter; with a quantity= that is what is drawn upwards")
-    axes = Coordinates(
-        (named_axis(group, x) or plane_axes(group)[0], None) if projected else plane_axes(group, x, y), view or View()
-    )
-    check_count("labels", labels, len(group), "curves")
+    pairs, wrong = {plane_of(dataset) for dataset in group}, "was not free on these curves"
+    plane: tuple[str | None, ...]
+    if projected:
+        plane = named_axis(group, x) or chosen_axes(group, pairs, None, None, wrong)[0], None
+    else:
+        plane = chosen_axes(group, pairs, x, y, wrong)
+    axes = Coordinates(plane, view or View())
+    strokes.check_count("labels", labels, len(group), "curves")
     for dataset in group:
         axes.check(dataset)
     names = [plain(name) for name in (labels if labels is not None else boundary_names(group))]
@@ -181,7 +184,7 @@ def boundary_names(group: Sequence[xarray.Dataset]) -> list[str]:
     full = list(names)
     for name in dict.fromkeys(names):
         alike = [index for index, other in enumerate(names) if other == name]
-        words = differing([fixed_parameters(group[index]) for index in alike])
+        words = strokes.differing([strokes.fixed_parameters(group[index]) for index in alike])
         for index, own in zip(alike, words, strict=True):
             full[index] = ", ".join([name, *own])
     return full
@@ -191,18 +194,15 @@ def boundary_styles(group: Sequence[xarray.Dataset], names: Sequence[str]) -> li
     """The pen of each: by kind and period, and among those by name."""
     pens, kinds = [], [(kind_of(dataset), period_of(dataset)) for dataset in group]
     for (kind, nu), place in zip(kinds, places_among(kinds, names), strict=True):
-        white, width = _APART[place % len(_APART)]
-        pens.append(Pen(tinted(_colour(kind, nu), white), width * KINDS[kind].width, style.curve_style(place).dash))
+        row, (white, width) = KINDS[kind], _APART[place % len(_APART)]
+        own = (
+            tinted(row.line, 0.0 if nu == 1 else _STAGE) if row.line else period_colour(2 * nu if kind == "PD" else nu)
+        )
+        pens.append(Pen(tinted(own, white), width * row.width, style.curve_style(place).dash))
     return pens
 
 
-def _colour(kind: str, nu: int) -> str:
-    if KINDS[kind].line:
-        return tinted(KINDS[kind].line, 0.0 if nu == 1 else _STAGE)
-    return period_colour(2 * nu if kind == "PD" else nu)
-
-
-def _subcritical(dataset: xarray.Dataset, whole: Line) -> np.ndarray:
+def _subcritical(dataset: xarray.Dataset, whole: strokes.Line) -> np.ndarray:
     """(vertices - 1,) whether the period doublings between two vertices of the line are subcritical.
 
     The sign of c3 at the points decides; it changes at a located GPD, where there is one.
@@ -248,7 +248,8 @@ def event_markers(dataset: xarray.Dataset, axes: Coordinates, marked: np.ndarray
 
 def event_entries(kinds: Iterable[Any]) -> dict[str, Entry]:
     """What the legend says of kinds of events."""
-    names = sorted({str(kind) for kind in kinds}, key=event_rank)
+    every, known = {str(kind) for kind in kinds}, list(style.KINDS)
+    names = [*filter(every.__contains__, known), *sorted(every.difference(known))]  # a user's own behind the others
     return {event_words(kind): Entry(mark=style.kind_style(kind).mark()) for kind in names}
 
 
@@ -275,7 +276,8 @@ def _names_of_events(group: Sequence[xarray.Dataset], axes: Coordinates) -> list
         for place, kind, extreme in zip(places[marked], kinds[marked], np.array(extremes)[marked], strict=True):
             if kind in (CENTRE, MERGING):
                 value = place[0] if upwards == "omega" else None if upwards is None else place[1]
-                ends.append(Label(place, end_text(str(kind), value)))
+                word = "born" if kind == CENTRE else "merges"
+                ends.append(Label(place, word if value is None else f"{word} {value:#.4g}"))
             elif str(kind) != "extremum":
                 points.append(Label(place, str(kind)))
             elif upwards is not None and str(extreme).endswith(f" of {upwards}"):
@@ -284,19 +286,6 @@ def _names_of_events(group: Sequence[xarray.Dataset], axes: Coordinates) -> list
 
 
 # ----------------------------------------------------------------------------------------------------------------- axes
-def _checked(curves: Sequence[Any]) -> list[xarray.Dataset]:
-    """The datasets of curves of bifurcations, at least one; InputError for anything else."""
-    group = checked(curves)
-    if not all(is_boundary(dataset) for dataset in group):
-        raise InputError("this is no curve of bifurcations; plot draws responses, plot_space both together")
-    return group
-
-
-def plane_axes(group: Sequence[xarray.Dataset], x: str | None = None, y: str | None = None) -> tuple[str, str]:
-    """The parameters to the right and upwards; default the two that were free, which must be the same of all."""
-    return chosen_axes(group, {plane_of(dataset) for dataset in group}, x, y, "was not free on these curves")
-
-
 def chosen_axes(
     group: Sequence[xarray.Dataset], pairs: set[tuple[str, str]], x: str | None, y: str | None, wrong: str
 ) -> tuple[str, str]:
@@ -316,3 +305,285 @@ def chosen_axes(
         raise InputError(f"{given!r} {wrong}{suggest(given, pair)}: give x= and y=")
     other = pair[1] if given == pair[0] else pair[0]
     return (given, other) if x is not None else (other, given)
+
+
+# ------------------------------------------------------------------------------------------------------------- in space
+#: width of a response curve beside a curve of bifurcations, and of this one
+_THIN, _THICK = 0.7, 1.25
+#: share of white in the projection on the floor
+_SHADE = 0.55
+#: opacity of the surface of an isola
+_CLEAR = 0.16
+
+
+@with_options(SpaceOptions)
+def plot_space(
+    curves: Any,
+    path: str | Path | None = None,
+    *,
+    x: str | None = None,
+    y: str | None = None,
+    zlabel: str | None = None,
+    elevation: float = 24.0,
+    azimuth: float = -58.0,
+    title: str | None = None,
+    size: str | tuple[float, float] = (6.4, 5.0),
+    **options: Unpack[SpaceOptions],
+) -> Figure:
+    """Response curves at several values of a parameter, and curves of bifurcations through them, in space.
+
+    Parameters
+    ----------
+    curves
+        Branches, tracked ones among them, or their datasets, isolas, or what has `branches`, as `suboctave.plot` takes
+        them. The closed branches of an isola that are known are drawn, and the surface that they lie on.
+    path
+        Where the figure is saved: .png, .svg or .pdf, fonts embedded.
+    x, y
+        The axes to the right and into the depth: "omega" or parameters; default those in which bifurcations were
+        tracked, or omega and the parameter that differs between the response curves.
+    zlabel
+        Text of the vertical axis; `xlabel` and `ylabel` are those of the others.
+    elevation, azimuth
+        From where it is seen, degrees above the floor and around the vertical axis.
+    title, size
+        As in `suboctave.plot`.
+
+    Raises
+    ------
+    InputError
+        For what cannot be drawn, before anything is.
+    """
+    view = View(**dict[str, Any](options))
+    for name, angle in (("elevation", elevation), ("azimuth", azimuth)):
+        if isinstance(angle, bool) or not isinstance(angle, int | float) or not np.isfinite(angle):
+            raise InputError(f"{name} is an angle in degrees, not {angle!r}")
+    drawing = space_drawing(datasets_of(curves, view), x=x, y=y, view=view)
+    drawing.title, drawing.seen_from = plain(title or ""), (float(elevation), float(azimuth))
+    if zlabel:
+        drawing.axes = [*drawing.axes[:2], Axis(zlabel, drawing.axes[2].low, drawing.axes[2].high)]
+    sheet = style.sheet_of(size)
+    if sheet.named:  # named sizes are widths: in space more height is needed
+        width = sheet.inches[0]
+        sheet = style.Sheet((width, 0.8 * width if width < 5.0 else 0.62 * width), sheet.look, named=True)
+    return figure_of(drawing, sheet, path)
+
+
+def space_drawing(
+    given: Sequence[xarray.Dataset],
+    *,
+    x: str | None = None,
+    y: str | None = None,
+    view: View | None = None,
+    names: Sequence[str] | None = None,
+) -> Drawing:
+    """Response curves and curves of bifurcations laid out in space; `names`: of all that is given, for the browser."""
+    group, heads = split(given)
+    checked(group)
+    axes = Coordinates((*space_axes(group, x, y), None), view or View())
+    for dataset in group:
+        axes.check(dataset)
+    limits = axes.limits(group, *[_MARGIN_IN_SPACE] * 3, from_zero=True)
+    floor = limits[2][0]
+    called = dict(zip(map(id, given), names or (), strict=False))
+    frame = Frame([*shade(heads, axes.names[:2], axes.factors, floor)])
+    for nu, grid in _surfaces(given, axes):
+        words = f"{period_name(nu)} isola"
+        seen: dict[str, Any] = {"role": "isola", "layer": 2.0, "name": words, "group": words}
+        frame.add(Surface(grid, period_colour(nu), _CLEAR, **seen))
+        frame.entries[words] = Entry(patch=period_colour(nu), opacity=2.0 * _CLEAR)
+    bounds = [(dataset, with_ends(dataset, heads)) for dataset in group if is_boundary(dataset)]
+    responses = [dataset for dataset in group if not is_boundary(dataset)]
+    kinds = {(kind_of(dataset), period_of(dataset)) for dataset, _ in bounds}
+    dashed = _add_responses(frame, responses, axes, called, kinds)
+    _add_boundaries(frame, bounds, axes, called, floor)
+    if dashed:
+        frame.entries["unstable"] = Entry(Pen(style.SOFT, _THIN, style.UNSTABLE_DASH))
+    marks = [item.role for item in frame.items if isinstance(item, Markers)]
+    short = {event_words(kind): style.kind_style(kind).name for kind, _ in kinds}
+    frame.entries |= {short.get(name, name): entry for name, entry in event_entries(marks).items()}
+    labels = axes.labels(group)
+    return Drawing([Axis(label, *own) for label, own in zip(labels, limits, strict=True)], [frame])
+
+
+def _add_responses(
+    frame: Frame,
+    responses: Sequence[xarray.Dataset],
+    axes: Coordinates,
+    called: dict[int, str],
+    tracked: set[tuple[str, int]],
+) -> bool:
+    """Response curves from the back to the front, with markers where they meet curves of bifurcations.
+
+    Returns whether parts of them are unstable.
+    """
+    depths = [float(np.nanmean(axes.of(dataset)[0][1])) for dataset in responses]
+    verdicts = set[bool | None]()
+    for index in np.argsort(depths, kind="stable")[::-1]:
+        dataset = responses[index]
+        pen, name = Pen(period_colour(period_of(dataset)), _THIN, style.UNSTABLE_DASH), called.get(id(dataset), "")
+        verdicts |= add_strokes(frame, dataset, axes, pen, seen_as("response", name))
+    for nu in sorted({period_of(dataset) for dataset in responses}):
+        words = "response" if nu == 1 else f"response, {period_name(nu)}"
+        frame.entries[words] = Entry(Pen(period_colour(nu), _THIN))
+    for dataset in responses:
+        met = [(str(kind), period_of(dataset)) in tracked for kind in dataset["event_kind"].to_numpy()]
+        for _, look, placed in events_of(dataset, axes, np.array(met, dtype=bool)):
+            frame.add(Markers(mark=look.mark(size=1.3 * SMALL), layer=6.0, name=look.name, group=look.name, **placed))
+    return False in verdicts
+
+
+def _add_boundaries(
+    frame: Frame,
+    bounds: Sequence[tuple[xarray.Dataset, xarray.Dataset]],
+    axes: Coordinates,
+    called: dict[int, str],
+    floor: float,
+) -> None:
+    """Curves of bifurcations, as given and with the ends of isolas among their events, and their projections."""
+    within = set[bool | None]()
+    names = [plain(name) for name in boundary_names([dataset for dataset, _ in bounds])]
+    pens = boundary_styles([dataset for dataset, _ in bounds], names)
+    for (given, dataset), name, pen in zip(bounds, names, pens, strict=True):
+        pale, thick = Pen(tinted(pen.colour, _SHADE), 0.7 * pen.width), Pen(pen.colour, _THICK * pen.width, pen.dash)
+        curve = called.get(id(given), name)
+        add_strokes(frame, dataset, axes, pale, seen_as("floor", curve), floor=floor, layer=1.0)
+        within |= add_strokes(frame, dataset, axes, thick, seen_as("boundary", curve), layer=5.0)
+        frame.entries[name] = Entry(thick.along(None))
+        frame.items += event_markers(dataset, axes, np.ones(dataset.sizes["event"], dtype=bool))
+    frame.entries |= verdict_entries(within, _THICK)
+
+
+def _surfaces(given: Sequence[xarray.Dataset], axes: Coordinates) -> list[tuple[int, np.ndarray]]:
+    """Period and grid (3, rows, columns) of the surface of each isola whose closed branches are among the datasets.
+
+    Closed branches belong to the isolas that stand before them.
+    """
+    loops: dict[tuple[int, int], list[xarray.Dataset]] = {}
+    heads = 0
+    for dataset in given:
+        heads += is_isolas(dataset)
+        if "isola" in dataset.attrs and not is_boundary(dataset):
+            loops.setdefault((heads - 1, int(dataset.attrs["isola"])), []).append(dataset)
+    every, surfaces = split(given)[1], []
+    for (which, number), closed in loops.items():
+        tips = []
+        for dataset in given if which >= 0 else ():
+            if is_boundary(dataset):
+                kinds = with_ends(dataset, [every[which].isel(isola=[number])])["event_kind"].to_numpy()
+                tips += list(axes.of(dataset)[1].T[kinds == CENTRE])
+        lines = [strokes.cut(dataset, line_through(dataset, *axes.of(dataset))) for dataset in closed]
+        around = [np.hstack([stroke.at for stroke in own]) for own in lines]
+        grid = strokes.surface(around, tips[:1])
+        if grid is not None:
+            surfaces.append((period_of(closed[0]), grid))
+    return surfaces
+
+
+def space_axes(group: Sequence[xarray.Dataset], x: str | None = None, y: str | None = None) -> tuple[str, str]:
+    """What is drawn to the right and into the depth; InputError where that must be given, or is not there."""
+    pairs = {plane_of(dataset) for dataset in group if is_boundary(dataset)}
+    if not pairs and (x is None or y is None):
+        # parameters that are constant on each curve, or vary, and are not the same on all
+        free, every = {str(dataset.attrs["free"]) for dataset in group}, group[0]["parameter"].to_numpy().astype(str)
+        values = {n: np.concatenate([coordinate(data, n)[0] for data in group]) for n in every if n not in free}
+        names = [name for name, value in values.items() if np.ptp(value) > 0.0]
+        if len(free) == 1 and len(names) == 1:
+            pairs = {(next(iter(free)), names[0])}
+        elif x is None and y is not None:
+            pairs = {(str(group[0].attrs["free"]), y)}
+        elif len(free) == 1 and y is None:
+            raise InputError(
+                f"name the parameter into the depth with y=; the curves differ in {', '.join(names) or 'none'}"
+            )
+    return chosen_axes(group, pairs, x, y, f"is neither of {', '.join(next(iter(pairs), ()))}")
+
+
+# --------------------------------------------------------------------------------------------------------------- isolas
+#: kinds that the events at the two ends of an isola have in pictures
+CENTRE, MERGING = "isola_centre", "isola_merging"
+#: an event within this, relative to its values, is the end itself
+_SAME = 1e-8
+#: share of white in the region of an isola
+_PALE = 0.82
+
+
+def is_isolas(dataset: xarray.Dataset) -> bool:
+    """Whether a dataset is that of isolas."""
+    return bool(dataset.attrs.get("isolas"))
+
+
+def parameter_of(dataset: xarray.Dataset) -> str:
+    """The design parameter of a dataset of isolas."""
+    return str(dataset.attrs["isolas"])
+
+
+def split(datasets: Sequence[xarray.Dataset]) -> tuple[list[xarray.Dataset], list[xarray.Dataset]]:
+    """The datasets of curves, and those of isolas."""
+    heads = [dataset for dataset in datasets if is_isolas(dataset)]
+    return [dataset for dataset in datasets if not is_isolas(dataset)], heads
+
+
+def shade(
+    heads: Sequence[xarray.Dataset], names: Sequence[str | None], factors: np.ndarray, floor: float | None = None
+) -> list[Region]:
+    """The regions of isolas in the plane of two axes, if it is theirs; in space on the floor, at this height."""
+    shaded = []
+    for head in heads:
+        if set(names) != {"omega", parameter_of(head)}:
+            continue
+        for number, nu in enumerate(head["period"].to_numpy()):
+            own, words = head["edge_isola"].to_numpy() == number, f"{period_name(int(nu))} isola"
+            value, low, high = (head[f"edge_{name}"].to_numpy()[own] for name in ("value", "low", "high"))
+            around = np.concatenate([low, high[::-1], low[:1]]), np.concatenate([value, value[::-1], value[:1]])
+            outline = np.array([around[name != "omega"] for name in names]) * factors[:2, None]
+            colour = tinted(period_colour(int(nu)), _PALE)
+            if floor is None:
+                shaded.append(Region(outline, colour, role="isola", layer=1.5, name=words, group=words))
+            else:
+                outline = np.vstack([outline, np.full(outline.shape[1], floor)])
+                shaded.append(Region(outline, colour, role="isola-floor", layer=0.9))
+    return shaded
+
+
+def with_ends(dataset: xarray.Dataset, heads: Sequence[xarray.Dataset]) -> xarray.Dataset:
+    """The dataset of a curve, the ends of isolas among its events under kinds of their own."""
+    kinds, there = dataset["event_kind"].to_numpy().astype(object), dataset["event_omega"].to_numpy()
+    for head in heads:
+        if parameter_of(head) not in dataset["parameter"].to_numpy():
+            continue
+        at = coordinate(dataset, parameter_of(head))[1]
+        for kind, name in ((CENTRE, "born"), (MERGING, "merges")):
+            for omega, value in zip(head[f"{name}_omega"].to_numpy(), head[name].to_numpy(), strict=True):
+                near = np.abs(at - value) <= _SAME * max(abs(value), 1e-300)
+                kinds[near & (np.abs(there - omega) <= _SAME * abs(omega))] = kind
+    return dataset.assign(event_kind=("event", kinds))
+
+
+# ------------------------------------------------------------------------------------------------- live or from a file
+def datasets_of(curves: Any, view: View) -> list[xarray.Dataset]:
+    """The datasets of what `plot` takes, with the quantity that is drawn."""
+    datasets = [dataset for item in several_of(curves) for dataset in _datasets(item, view)]
+    drawn = iter(view.completed([dataset for dataset in datasets if not is_isolas(dataset)]))
+    return [dataset if is_isolas(dataset) else next(drawn) for dataset in datasets]
+
+
+def several_of(curves: Any) -> list[Any]:
+    """The branches and diagrams of what is given."""
+    named = getattr(curves, "branches", None)
+    if isinstance(named, Mapping):  # results of a study
+        others = (getattr(curves, kind, {}).values() for kind in ("diagrams", "isolas"))
+        return [*named.values(), *(item for group in others for item in group)]
+    return list(curves) if isinstance(curves, list | tuple) else [curves]
+
+
+def _datasets(item: Any, view: View) -> list[xarray.Dataset]:
+    """The dataset of a branch, those of all branches of a diagram."""
+    import xarray
+
+    if isinstance(item, xarray.Dataset):
+        return [item]
+    if not hasattr(item, "to_xarray"):
+        raise InputError(f"plot draws branches, diagrams, isolas and their datasets, not {type(item).__name__}")
+    given = item.to_xarray(readings=view.readings(getattr(item, "nu", 0)))
+    return list(given.values()) if isinstance(given, dict) else [given]

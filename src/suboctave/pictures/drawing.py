@@ -6,7 +6,7 @@ it down for Plotly. Texts are those of Matplotlib, with formulas between dollar 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
@@ -233,25 +233,9 @@ class Drawing:
         return {name: every[name] for name in sorted(every, key=rank)}
 
 
-def extent(items: Iterable[Item]) -> tuple[np.ndarray, np.ndarray]:
-    """The least and the largest values of lines and markers, (axes,) each."""
-    every = np.concatenate([item.at for item in items if isinstance(item, Polyline | Markers)], axis=1)
-    known = [row[np.isfinite(row)] for row in every]
-    return (
-        np.array([row.min() if row.size else 0.0 for row in known]),
-        np.array([row.max() if row.size else 0.0 for row in known]),
-    )
-
-
 def lengths(path: np.ndarray) -> np.ndarray:
     """Lengths along a polyline (vertices, axes) from its beginning to each vertex."""
     return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
-
-
-def event_rank(kind: str) -> tuple[int, str]:
-    """The place of a kind of event in a legend: as in the table of styles, then a user's own."""
-    order = list(style.KINDS)
-    return (order.index(kind) if kind in order else len(order)), kind
 
 
 #: hatches of cells whose motion does not repeat, or lies on an isola, and their colours

@@ -9,24 +9,22 @@ paler in basins. What does not repeat is grey, in basins hatched.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from suboctave.errors import InputError, chosen_dof, suggest
-from suboctave.options import with_options
 from suboctave.pictures import style
+from suboctave.pictures.boundary import datasets_of
 from suboctave.pictures.drawing import STROKES, Axis, Band, Entry, Frame, Guide, Markers, Polyline, Raster, dot, plain
-from suboctave.pictures.options import Coordinates, PageOptions, View, as_multiple, shown_multiple
-from suboctave.pictures.paper import single
-from suboctave.pictures.response import datasets_of, response_frame
+from suboctave.pictures.options import Coordinates, View, as_multiple, check_quantity, shown_multiple
+from suboctave.pictures.paper import Layout, picture
+from suboctave.pictures.response import response_frame
 from suboctave.pictures.strokes import check_count
 from suboctave.pictures.style import Mark, Pen, period_colour, period_name, places_among, rgb, tinted
 
 if TYPE_CHECKING:
     import xarray
-    from matplotlib.figure import Figure
 
 
 _POINTING = {"up": "^", "down": "v", "rest": "o"}
@@ -38,17 +36,9 @@ _OTHER = {-1: ("aperiodic", "#e3e3e3"), -2: ("left the range", "#d55e00"), -3: (
 _APERIODIC = -1
 
 
-@with_options(PageOptions)
-def plot_trajectory(
-    trajectory: xarray.Dataset,
-    path: str | Path | None = None,
-    *,
-    dof: int | None = None,
-    quantity: str = "displacement",
-    **page: Unpack[PageOptions],
-) -> Figure:
+@picture((7.2, 3.2))
+def plot_trajectory(trajectory: xarray.Dataset, *, dof: int | None = None, quantity: str = "displacement") -> Layout:
     """The displacement (or "velocity") of one degree of freedom over time, instants of phase 0 marked."""
-    check_contents(trajectory, "trajectory")
     check_quantity(quantity, ("displacement", "velocity"))
     dof = checked_dof(trajectory, dof)
     time = trajectory["time"].to_numpy() * float(trajectory.attrs["omega"]) / (2.0 * np.pi)
@@ -58,15 +48,12 @@ def plot_trajectory(
     strobe = Markers(instants, dot(style.CURVE_COLOURS[0], 3.0), cut=True, role="strobe", layer=4.0)
     across = Axis(r"time in load periods, $t/T$", time[0], time[-1])
     upwards = Axis(symbol_of(trajectory, dof, int(quantity == "velocity")))
-    return single(Frame([line, strobe]), (across, upwards), page, path, (7.2, 3.2))
+    return Frame([line, strobe]), (across, upwards)
 
 
-@with_options(PageOptions)
-def plot_sections(
-    sections: xarray.Dataset, path: str | Path | None = None, *, dof: int | None = None, **page: Unpack[PageOptions]
-) -> Figure:
+@picture((5.2, 4.6), by_kind=True)
+def plot_sections(sections: xarray.Dataset, *, dof: int | None = None) -> Layout:
     """Stroboscopic points in the plane of displacement and velocity of one degree of freedom, coloured by period."""
-    check_contents(sections, "poincare sections")
     dof = checked_dof(sections, dof)
     at = np.array([sections[name].to_numpy()[..., dof] for name in ("displacement", "velocity")])
     frame, periods = Frame(), sections["period"].to_numpy()
@@ -76,20 +63,18 @@ def plot_sections(
         frame.add(_points(chosen, period, 4.0 if period else 0.8, f"period {period}"))
         frame.entries[_name(period)] = Entry(mark=dot(_colour(period)))
     axes = [Axis(symbol_of(sections, dof, order)) for order in (0, 1)]
-    return single(frame, axes, page, path, (5.2, 4.6), by_kind=True)
+    return frame, axes
 
 
-@with_options(PageOptions)
+@picture((6.4, 4.2), by_kind=True)
 def plot_brute_force(
     diagram: xarray.Dataset,
-    path: str | Path | None = None,
     *,
     curves: Any = None,
     quantity: str = "amplitude",
     starts: Sequence[str] | None = None,
     dof: int | None = None,
-    **page: Unpack[PageOptions],
-) -> Figure:
+) -> Layout:
     """The motions over the parameter that was varied, with branches beneath if any are given.
 
     Parameters
@@ -109,7 +94,6 @@ def plot_brute_force(
     InputError
         For what cannot be drawn, before anything is.
     """
-    check_contents(diagram, "brute force")
     check_quantity(quantity, ("amplitude", "section"))
     if curves is not None and quantity != "amplitude":
         raise InputError('curves= are drawn with quantity="amplitude"')
@@ -130,13 +114,12 @@ def plot_brute_force(
     symbol = symbol_of(diagram, dof, 0).strip("$")
     upwards = rf"$\max\,|{symbol}|$" if quantity == "amplitude" else rf"${symbol}(t_k)$, stroboscopic"
     across = Axis(r"$\omega$" if varied == "omega" else plain(varied), low, high)
-    return single(frame, (across, Axis(upwards)), page, path, (6.4, 4.2), by_kind=True)
+    return frame, (across, Axis(upwards))
 
 
-@with_options(PageOptions)
+@picture((6.4, 4.2), by_kind=True)
 def plot_stepped_sine(
     test: xarray.Dataset,
-    path: str | Path | None = None,
     *,
     curves: Any = None,
     measured: Any = None,
@@ -144,8 +127,7 @@ def plot_stepped_sine(
     dof: int | None = None,
     xlim: Sequence[float] | None = None,
     ylim: Sequence[float] | None = None,
-    **page: Unpack[PageOptions],
-) -> Figure:
+) -> Layout:
     """The modulus of a component at each step: upward and downward triangles, coloured by the period of the motion.
 
     Parameters
@@ -164,7 +146,6 @@ def plot_stepped_sine(
     InputError
         For what cannot be drawn, before anything is.
     """
-    check_contents(test, "stepped sine")
     dof = checked_dof(test, dof)
     harmonic = as_multiple(harmonic)
     listed = _measured(measured, harmonic)
@@ -188,7 +169,7 @@ def plot_stepped_sine(
         frame.add(marks, plain(one.label))
     symbol = f"X_{{{shown_multiple(harmonic)}}}" + ("" if test.attrs["dofs"] == 1 else f"^{{({dof})}}")
     axes = Axis(r"$\omega$", low, high), Axis(f"$|{symbol}|$", *(limits.ylim or (0.0, None)))
-    return single(frame, axes, page, path, (6.4, 4.2), by_kind=True)
+    return frame, axes
 
 
 def _limits(values: np.ndarray) -> tuple[float, float]:
@@ -260,21 +241,6 @@ def symbol_of(dataset: xarray.Dataset, dof: int, order: int) -> str:
     return rf"$\dot {symbol}$" if order else f"${symbol}$"
 
 
-def check_contents(dataset: Any, contents: str) -> None:
-    """InputError for what is no dataset of these contents."""
-    given = getattr(dataset, "attrs", {}).get("contents")
-    if given != contents:
-        raise InputError(
-            f"expected a dataset of {contents!r}, got {given or type(dataset).__name__!r}; use its to_xarray()"
-        )
-
-
-def check_quantity(quantity: str, known: Sequence[str]) -> None:
-    """InputError for a quantity that is not among those known."""
-    if quantity not in known:
-        raise InputError(f"unknown quantity {quantity!r}{suggest(str(quantity), known)}")
-
-
 def checked_dof(dataset: xarray.Dataset, dof: int | None) -> int:
     """The degree of freedom that is drawn, default the observed one; InputError where there is none."""
     return chosen_dof(dof, int(dataset.attrs["observed"]), int(dataset.attrs["dofs"]))
@@ -290,12 +256,9 @@ _GROWTH, _UNKNOWN = ("#dbe9f4", "#4292c6", "#08306b"), "#dadada"
 _LINES = (style.INK, "#D55E00", "#009E73", "#E69F00")
 
 
-@with_options(PageOptions)
-def plot_lyapunov(
-    exponents: xarray.Dataset, path: str | Path | None = None, *, count: int | None = None, **page: Unpack[PageOptions]
-) -> Figure:
+@picture((6.0, 3.6))
+def plot_lyapunov(exponents: xarray.Dataset, *, count: int | None = None) -> Layout:
     """Running averages over the periods, with the result and a band of two standard errors; the first `count`."""
-    check_contents(exponents, "lyapunov exponents")
     running = exponents["running"].to_numpy()
     shown = running.shape[1] if count is None else min(int(count), running.shape[1])
     period = np.arange(1, len(running) + 1)
@@ -309,15 +272,12 @@ def plot_lyapunov(
         line = Polyline(np.array([period, running[:, i]]), Pen(colour), role=f"exponent {i}", layer=4.0)
         frame.add(line, rf"$\lambda_{{{i + 1}}}$ = {value:.4g} ± {error:.1g}")
     axes = Axis("load periods averaged over", 1.0, len(running), logarithmic=True), Axis(_EXPONENT)
-    return single(frame, axes, page, path, (6.0, 3.6))
+    return frame, axes
 
 
-@with_options(PageOptions)
-def plot_separation(
-    separation: xarray.Dataset, path: str | Path | None = None, *, most: int = 20, **page: Unpack[PageOptions]
-) -> Figure:
+@picture((6.0, 3.8))
+def plot_separation(separation: xarray.Dataset, *, most: int = 20) -> Layout:
     """Distances of two trajectories over time for at most `most` settings, and the mean rate as a line."""
-    check_contents(separation, "separation")
     time, distance = separation["time"].to_numpy(), separation["distance"].to_numpy()
     which = np.unique(np.linspace(0, len(distance) - 1, max(1, int(most))).astype(int))
     frame = Frame()
@@ -334,22 +294,19 @@ def plot_separation(
         mean = Polyline(np.array([time[keep], line[keep]]), Pen(style.CURVE_COLOURS[0], 1.3), layer=4.0)
         frame.add(mean, rf"$\lambda$ = {exponent:.3f}, one setting ± {spread:.2g}")
     axes = Axis("time", time[0], time[-1]), Axis(r"distance $\delta$", logarithmic=True)
-    return single(frame, axes, page, path, (6.0, 3.8))
+    return frame, axes
 
 
-@with_options(PageOptions)
+@picture((6.4, 4.2), grid=False)
 def plot_lyapunov_map(
     chart: xarray.Dataset,
-    path: str | Path | None = None,
     *,
     lines: Sequence[tuple[str, np.ndarray, np.ndarray]] = (),
-    **page: Unpack[PageOptions],
-) -> Figure:
+) -> Layout:
     """Largest exponents in colour where the motion is chaotic, white where it is not, grey where nothing is known.
 
     `lines`: a name, frequencies and values of the parameter each, drawn over it.
     """
-    check_contents(chart, "lyapunov map")
     across, upwards = _edges(chart["omega"].to_numpy()), _edges(chart["value"].to_numpy())
     exponent, chaotic = chart["exponent"].to_numpy(), chart["chaotic"].to_numpy().astype(bool)
     top = float(exponent[chaotic].max()) if chaotic.any() else 1.0
@@ -363,22 +320,19 @@ def plot_lyapunov_map(
     for name, x, y in lines:
         frame.add(Polyline(np.array([x, y]), Pen(_LINES[known.index(name) % len(_LINES)])), name)
     axes = Axis(r"$\omega$", *across[[0, -1]]), Axis(plain(chart.attrs["varied"]), *upwards[[0, -1]])
-    return single(frame, axes, page, path, (6.4, 4.2), grid=False)
+    return frame, axes
 
 
-@with_options(PageOptions)
+@picture((5.6, 4.6), legend="below", grid=False)
 def plot_basins(
     basins: xarray.Dataset,
-    path: str | Path | None = None,
     *,
     points: Sequence[np.ndarray] | None = None,
-    **page: Unpack[PageOptions],
-) -> Figure:
+) -> Layout:
     """The plane of states, each in the colour of the motion that it tends to.
 
     `points`: of each attractor its stroboscopic points (n, 2) in this plane, which are marked.
     """
-    check_contents(basins, "basins")
     names = [str(name) for name in basins["attractor"].to_numpy()]
     check_count("points", points, len(names), "attractors")
     labels = basins["label"].to_numpy()
@@ -408,7 +362,7 @@ def plot_basins(
         for letter, edges in zip("xy", (x, y), strict=True)
     ]
     # there is no free place inside
-    return single(frame, axes, page, path, (5.6, 4.6), legend="below", grid=False)
+    return frame, axes
 
 
 def _colours(periods: np.ndarray) -> list[str]:
@@ -445,15 +399,13 @@ _MARKS = {
 }
 
 
-@with_options(PageOptions)
+@picture((6.4, 4.2), by_kind=True)
 def plot_verified(
     curve: xarray.Dataset,
     places: np.ndarray,
     outcomes: Sequence[str],
     unconfirmed: np.ndarray,
-    path: str | Path | None = None,
-    **page: Unpack[PageOptions],
-) -> Figure:
+) -> Layout:
     """The curve of a dataset with a mark at each of `places` (P, 2), by its outcome.
 
     `unconfirmed` (B, 2): bifurcations that shooting did not confirm; they get a ring.
@@ -467,4 +419,4 @@ def plot_verified(
         if len(here):
             frame.add(Markers(here.T, mark, role=outcome, layer=layer), name)
     across, upwards = axes.labels([curve])
-    return single(frame, (Axis(across), Axis(upwards, 0.0)), page, path, (6.4, 4.2), by_kind=True)
+    return frame, (Axis(across), Axis(upwards, 0.0))

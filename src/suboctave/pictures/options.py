@@ -6,7 +6,7 @@ The public verbs take these as keywords; `View` and `MotionView` hold them once 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING, Annotated, Any, TypedDict
@@ -165,8 +165,7 @@ class View(Units):
     def __post_init__(self) -> None:
         if not self.quantity:
             object.__setattr__(self, "quantity", "amplitude" if self.harmonic is None else "harmonic")
-        if self.quantity not in QUANTITIES:
-            raise InputError(f"unknown quantity {self.quantity!r}{suggest(str(self.quantity), QUANTITIES)}")
+        check_quantity(self.quantity, QUANTITIES)
         needs = QUANTITIES[self.quantity].numbered
         for name, given in (("harmonic", self.harmonic), ("element", self.element)):
             if given is not None and needs != name:
@@ -247,7 +246,7 @@ class Coordinates:
     """
 
     names: tuple[str | None, ...]
-    view: View = View()
+    view: View
 
     @property
     def factors(self) -> np.ndarray:
@@ -346,8 +345,7 @@ class MotionView(Units):
 
     def check_quantity(self, known: Sequence[str]) -> None:
         """InputError for a quantity that is not among those known, or an element where none is asked for."""
-        if self.quantity not in known:
-            raise InputError(f"unknown quantity {self.quantity!r}{suggest(str(self.quantity), known)}")
+        check_quantity(self.quantity, known)
         if self.quantity == "force":
             _check_element("force", self.element)
         elif self.element is not None:
@@ -382,6 +380,12 @@ class MotionView(Units):
         if self.omega_reference is not None:
             return rf"$\omega/\omega_0$ = {omega / self.omega_reference:.4g}"
         return rf"$\omega$ = {omega:.4g}" + (" rad/s" if self.frequency else "")
+
+
+def check_quantity(quantity: str, known: Collection[str]) -> None:
+    """InputError for a quantity that is not among those known."""
+    if quantity not in known:
+        raise InputError(f"unknown quantity {quantity!r}{suggest(str(quantity), known)}")
 
 
 def as_multiple(given: Any) -> float:

@@ -7,16 +7,17 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Mapping, Sequence
-from functools import partial
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial, wraps
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import numpy as np
 
 from suboctave.atomic import replace_file
 from suboctave.errors import InputError, path_of, suggest
+from suboctave.options import with_options
 from suboctave.pictures import style
 from suboctave.pictures.drawing import (
     HATCHES,
@@ -34,7 +35,6 @@ from suboctave.pictures.drawing import (
     Raster,
     Region,
     Surface,
-    extent,
 )
 from suboctave.pictures.options import PageOptions
 from suboctave.pictures.strokes import bent
@@ -45,6 +45,9 @@ if TYPE_CHECKING:
     from matplotlib.legend import Legend
     from matplotlib.transforms import Bbox
 
+
+#: one frame and its axes
+Layout: TypeAlias = tuple[Frame, Sequence[Axis]]
 
 SUFFIXES = (".png", ".svg", ".pdf")
 # No time stamps: the same curve gives the same file.
@@ -78,11 +81,30 @@ def figure_of(drawing: Drawing, sheet: style.Sheet, path: str | Path | None = No
     return figure
 
 
-def single(frame: Frame, axes: Sequence[Axis], page: PageOptions, path: Any, size: Any, **arranged: Any) -> Figure:
-    """The figure of one frame under its title, of `size` unless the page has another; `arranged`: as of `Drawing`."""
-    frame.title = style.checked_text(page.get("title"))
-    given = page.get("size")
-    return figure_of(Drawing(axes, [frame], **arranged), style.sheet_of(size if given is None else given), path)
+class _Page(PageOptions, total=False):
+    """Keywords of what draws one frame."""
+
+    path: Annotated[str | Path | None, "Where the figure is saved: .png, .svg or .pdf."]
+
+
+def picture(size: tuple[float, float], **arranged: Any) -> Callable[[Callable[..., Layout]], Callable[..., Figure]]:
+    """What lays out one frame and its axes draws it then: the figure under a title, saved where a path is given.
+
+    `size`: inches, unless another is given; `arranged`: as of `Drawing`.
+    """
+
+    def decorated(layout: Callable[..., Layout]) -> Callable[..., Figure]:
+        @with_options(_Page)
+        @wraps(layout)
+        def drawn(*given: Any, **options: Any) -> Figure:
+            path, title, own = (options.pop(name, None) for name in ("path", "title", "size"))
+            frame, axes = layout(*given, **options)
+            frame.title = style.checked_text(title)
+            return figure_of(Drawing(axes, [frame], **arranged), style.sheet_of(size if own is None else own), path)
+
+        return drawn
+
+    return decorated
 
 
 def _in_plane(figure: Figure, drawing: Drawing, sheet: style.Sheet) -> None:
@@ -105,7 +127,12 @@ def _in_plane(figure: Figure, drawing: Drawing, sheet: style.Sheet) -> None:
         figure.suptitle(drawing.title, fontsize=look.large, color=style.INK)
     _place(figure, frames, drawing, sheet)  # the frames have their places: what is spaced on paper comes now
     for axes, frame in zip(frames, drawing.frames, strict=True):
-        _add_beads(axes, frame, look)
+        box = axes.get_window_extent()
+        size = box.width / figure.dpi * 25.4, box.height / figure.dpi * 25.4
+        low, high = np.array([axes.get_xlim(), axes.get_ylim()]).T
+        for item in frame.items:
+            if isinstance(item, Beads) and (at := item.places(low, high, size)).size:
+                _draw(axes, Markers(at, item.mark, role=item.role, layer=item.layer + 0.5), look, (1.0, 1.0))
         annotate(axes, frame.labels, look)
 
 
@@ -128,11 +155,11 @@ def _place(figure: Figure, frames: Sequence[Axes], drawing: Drawing, sheet: styl
 # ---------------------------------------------------------------------------------------------------- what is in frames
 def draw(axes: Any, frame: Frame, look: style.Look) -> None:
     """Draw what stands in a frame, but for what is spaced on paper and for labels."""
-    seen = [item for item in frame.items if isinstance(item, Polyline | Markers)]
-    low, high = extent(seen) if seen else (np.zeros(2), np.zeros(2))
-    spread = np.where(high > low, high - low, 1.0)
+    seen = [item.at for item in frame.items if isinstance(item, Polyline | Markers)]
+    known = [row[np.isfinite(row)] for row in np.concatenate(seen, axis=1)] if seen else [np.zeros(1)] * 2
+    width, height = ((float(np.ptp(row)) if row.size else 0.0) or 1.0 for row in known[:2])
     for item in frame.items:
-        _draw(axes, item, look, (float(spread[0]), float(spread[1])))
+        _draw(axes, item, look, (width, height))
 
 
 def _draw(axes: Any, item: Item, look: style.Look, spread: tuple[float, float]) -> None:
@@ -199,18 +226,6 @@ def _paint(axes: Axes, raster: Raster, look: style.Look, placed: dict[str, Any])
         bar.ax.tick_params(labelsize=look.small)
 
 
-def _add_beads(axes: Axes, frame: Frame, look: style.Look) -> None:
-    """Marks at equal distances on paper along lines."""
-    box = axes.get_window_extent()
-    size = box.width / axes.figure.dpi * 25.4, box.height / axes.figure.dpi * 25.4
-    low, high = np.array([axes.get_xlim(), axes.get_ylim()]).T
-    for item in frame.items:
-        if isinstance(item, Beads):
-            at = item.places(low, high, size)
-            if at.shape[1]:
-                _draw(axes, Markers(at, item.mark, role=item.role, layer=item.layer + 0.5), look, (1.0, 1.0))
-
-
 def handles(entries: Mapping[str, Entry], look: style.Look) -> dict[str, Any]:
     """What a legend shows beside its names."""
     from matplotlib.lines import Line2D
@@ -266,22 +281,15 @@ def _set_axis(letter: str, axes: Any, axis: Axis) -> None:
 # ------------------------------------------------------------------------------------------------------------- in space
 def _in_space(figure: Figure, drawing: Drawing, sheet: style.Sheet) -> None:
     """Arrange a drawing with three axes on a figure."""
-    axes: Any = figure.add_subplot(projection="3d", computed_zorder=False)
-    for letter, axis in zip("xyz", drawing.axes, strict=True):
-        getattr(axes, f"set_{letter}lim")(axis.low, axis.high)
-    draw(axes, drawing.frames[0], sheet.look)
-    _dress_space(axes, [axis.label for axis in drawing.axes], sheet)
-    axes.view_init(*drawing.seen_from)
-    _fill_page(figure, axes, drawing, sheet)
-
-
-def _dress_space(axes: Any, labels: list[str], sheet: style.Sheet) -> None:
     from matplotlib.ticker import MaxNLocator
 
     look, small = sheet.look, sheet.inches[0] < _SMALL
     pad = (-0.45 if small else 0.3) * look.large
-    for letter, label, axis in zip("xyz", labels, (axes.xaxis, axes.yaxis, axes.zaxis), strict=True):
-        getattr(axes, f"set_{letter}label")(label, fontsize=look.large, color=style.INK, labelpad=pad)
+    axes: Any = figure.add_subplot(projection="3d", computed_zorder=False)
+    for letter, given in zip("xyz", drawing.axes, strict=True):
+        getattr(axes, f"set_{letter}lim")(given.low, given.high)
+        getattr(axes, f"set_{letter}label")(given.label, fontsize=look.large, color=style.INK, labelpad=pad)
+        axis = getattr(axes, f"{letter}axis")
         axis.set_pane_color((1.0, 1.0, 1.0, 1.0))
         axis.pane.set_edgecolor(style.GRID)
         axis._axinfo["grid"].update({"color": style.GRID, "linewidth": 0.4 * look.line})
@@ -289,6 +297,9 @@ def _dress_space(axes: Any, labels: list[str], sheet: style.Sheet) -> None:
         axis.line.set_linewidth(0.53 * look.line)
         axis.set_major_locator(MaxNLocator(nbins=4 if small else 5, steps=[1, 2, 2.5, 5, 10]))
     axes.tick_params(labelsize=look.small, color=style.INK, pad=(-0.3 if small else -0.1) * look.small)
+    draw(axes, drawing.frames[0], look)
+    axes.view_init(*drawing.seen_from)
+    _fill_page(figure, axes, drawing, sheet)
 
 
 def _fill_page(figure: Figure, axes: Any, drawing: Drawing, sheet: style.Sheet) -> None:

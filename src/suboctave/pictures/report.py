@@ -22,13 +22,20 @@ from suboctave.atomic import free_place, replace_file
 from suboctave.errors import InputError, shortened
 from suboctave.kinds import KINDS
 from suboctave.pictures import style
-from suboctave.pictures.boundary import boundary_drawing, boundary_names, is_boundary, kind_of, plane_of
+from suboctave.pictures.boundary import (
+    boundary_drawing,
+    boundary_names,
+    is_boundary,
+    is_isolas,
+    kind_of,
+    parameter_of,
+    plane_of,
+    space_drawing,
+)
 from suboctave.pictures.browser import figure_data
 from suboctave.pictures.drawing import Drawing
-from suboctave.pictures.isolas import is_isolas, parameter_of
 from suboctave.pictures.paper import figure_of, image_of
 from suboctave.pictures.response import response_drawing
-from suboctave.pictures.space import space_drawing
 from suboctave.pictures.strokes import fixed_parameters, spelt
 from suboctave.pictures.style import period_name, period_of
 from suboctave.store.layout import check_layout, coordinate, parameter_column

@@ -6,7 +6,7 @@ Stable motions solid, unstable ones dashed, located bifurcations marked. Figures
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
@@ -15,9 +15,16 @@ import numpy as np
 from suboctave.errors import InputError
 from suboctave.options import with_options
 from suboctave.pictures import style
-from suboctave.pictures.boundary import boundary_names, boundary_styles, is_boundary, plot_boundaries
+from suboctave.pictures.boundary import (
+    boundary_names,
+    boundary_styles,
+    datasets_of,
+    is_boundary,
+    is_isolas,
+    plot_boundaries,
+    several_of,
+)
 from suboctave.pictures.drawing import Axis, Drawing, Entry, Frame, Markers, Ticks, plain
-from suboctave.pictures.isolas import is_isolas
 from suboctave.pictures.options import Coordinates, CurveOptions, View
 from suboctave.pictures.paper import draw, dress, figure_of, handles
 from suboctave.pictures.strokes import (
@@ -277,7 +284,7 @@ def plot(
     InputError
         For what cannot be drawn, before anything is.
     """
-    given = _several(curves)
+    given = several_of(curves)
     if len(given) == 1:  # a diagram says how it is drawn
         labels = getattr(given[0], "legend", None) if labels is None else labels
         if options.get("marks") is None:
@@ -299,31 +306,3 @@ def plot(
             "other; or draw each kind by itself"
         )
     return plot_response([data for data in datasets if not is_isolas(data)], path, x=x, **texts)
-
-
-def datasets_of(curves: Any, view: View) -> list[xarray.Dataset]:
-    """The datasets of what `plot` takes, with the quantity that is drawn."""
-    datasets = [dataset for item in _several(curves) for dataset in _datasets(item, view)]
-    drawn = iter(view.completed([dataset for dataset in datasets if not is_isolas(dataset)]))
-    return [dataset if is_isolas(dataset) else next(drawn) for dataset in datasets]
-
-
-def _several(curves: Any) -> list[Any]:
-    """The branches and diagrams of what is given."""
-    named = getattr(curves, "branches", None)
-    if isinstance(named, Mapping):  # results of a study
-        others = (getattr(curves, kind, {}).values() for kind in ("diagrams", "isolas"))
-        return [*named.values(), *(item for group in others for item in group)]
-    return list(curves) if isinstance(curves, list | tuple) else [curves]
-
-
-def _datasets(item: Any, view: View) -> list[xarray.Dataset]:
-    """The dataset of a branch, those of all branches of a diagram."""
-    import xarray
-
-    if isinstance(item, xarray.Dataset):
-        return [item]
-    if not hasattr(item, "to_xarray"):
-        raise InputError(f"plot draws branches, diagrams, isolas and their datasets, not {type(item).__name__}")
-    given = item.to_xarray(readings=view.readings(getattr(item, "nu", 0)))
-    return list(given.values()) if isinstance(given, dict) else [given]

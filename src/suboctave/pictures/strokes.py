@@ -29,47 +29,34 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class _Vertices:
-    """Vertices `at`, (axes, vertices), of which `x` and `y` are the first and the last row.
+class Line:
+    """The points of a curve and its events as one line, or a stroke of it.
 
-    `point` and `event`, (vertices,): the index of the point or event of the curve at each, else -1.
+    at
+        Its vertices, (axes, vertices), of which `x` and `y` are the first and the last row.
+    point, event
+        The index of the point or event of the curve at each, else -1, (vertices,).
+    stable
+        Whether the motions between two vertices are, (vertices - 1,); of a stroke one verdict. None: not computed.
     """
 
     at: np.ndarray
     point: np.ndarray
     event: np.ndarray
+    stable: Any
 
     @property
     def x(self) -> np.ndarray:
-        row: np.ndarray = self.at[0]
-        return row
+        return np.asarray(self.at[0])
 
     @property
     def y(self) -> np.ndarray:
-        row: np.ndarray = self.at[-1]
-        return row
+        return np.asarray(self.at[-1])
 
-
-@dataclass(frozen=True)
-class Line(_Vertices):
-    """The points of a curve and its events as one line.
-
-    `stable`, (vertices - 1,): whether the motions between two vertices are (None: not computed).
-    """
-
-    stable: np.ndarray | None
-
-
-@dataclass(frozen=True)
-class Stroke(_Vertices):
-    """A stretch of a curve on which all motions are stable or none is (None: not computed)."""
-
-    stable: bool | None
-
-    def part(self, first: int, last: int) -> Stroke:
-        """The vertices first .. last."""
+    def stroke(self, first: int, last: int, stable: bool | None) -> Line:
+        """The vertices first .. last, of one verdict."""
         here = slice(first, last + 1)
-        return Stroke(self.at[:, here], self.point[here], self.event[here], self.stable)
+        return Line(self.at[:, here], self.point[here], self.event[here], stable)
 
 
 def line(dataset: xarray.Dataset, x: str, y: str = "amplitude") -> Line:
@@ -79,15 +66,14 @@ def line(dataset: xarray.Dataset, x: str, y: str = "amplitude") -> Line:
     return line_through(dataset, np.array(points), np.array(events))
 
 
-def cut(dataset: xarray.Dataset, whole: Line) -> list[Stroke]:
+def cut(dataset: xarray.Dataset, whole: Line) -> list[Line]:
     """The line of a curve, cut where stability changes."""
-    drawn = Stroke(whole.at, whole.point, whole.event, None)
     if whole.stable is None:
-        return [drawn]
+        return [whole]
     if whole.stable.size == 0:
-        return [replace(drawn, stable=bool(dataset["stable"].to_numpy().all()))]
+        return [replace(whole, stable=bool(dataset["stable"].to_numpy().all()))]
     ends = [0, *(np.flatnonzero(np.diff(whole.stable)) + 1), whole.stable.size]
-    return [replace(drawn, stable=bool(whole.stable[first])).part(first, last) for first, last in pairwise(ends)]
+    return [whole.stroke(first, last, bool(whole.stable[first])) for first, last in pairwise(ends)]
 
 
 def line_through(dataset: xarray.Dataset, points: np.ndarray, events: np.ndarray) -> Line:
@@ -108,34 +94,20 @@ def line_through(dataset: xarray.Dataset, points: np.ndarray, events: np.ndarray
     point, event = np.full((2, at.shape[1]), -1)
     point[position] = np.arange(count)
     event[event_position] = order
-    verdict = None
-    if "stable" in dataset:
-        stable, stable_after = dataset["stable"].to_numpy().astype(bool), dataset["event_stable_after"].to_numpy()
-        verdict = _pieces(stable, after[order], stable_after[order], position, event_position)
-    return Line(at, point, event, verdict)
-
-
-def _pieces(
-    stable: np.ndarray, after: np.ndarray, stable_after: np.ndarray, position: np.ndarray, event_position: np.ndarray
-) -> np.ndarray:
-    """(vertices - 1,) whether each piece of the line is stable."""
-    count = stable.size + after.size
-    is_event = np.zeros(count, dtype=bool)
-    is_event[event_position] = True
-    here = np.zeros(count, dtype=bool)  # the verdict at a point, or right after an event
-    here[position] = stable
-    here[event_position] = stable_after == 1
-
-    first, last, between = here[:-1], here[1:], is_event[1:]
-    verdict: np.ndarray = np.where(is_event[:-1], np.where(between, first, last), first & (between | last))
-    return verdict
+    if "stable" not in dataset:
+        return Line(at, point, event, None)
+    here = np.zeros(len(point), dtype=bool)  # the verdict at a point, or right after an event
+    here[position] = dataset["stable"].to_numpy().astype(bool)
+    here[event_position] = dataset["event_stable_after"].to_numpy()[order] == 1
+    first, last, between = here[:-1], here[1:], event[1:] >= 0
+    return Line(at, point, event, np.where(event[:-1] >= 0, np.where(between, first, last), first & (between | last)))
 
 
 #: in units of the frame: nearer than this two lines are one, and so far along a line a part of it is another part
 _UPON, _ANOTHER = 4e-3, 3e-2
 
 
-def without_repeats(pieces: Sequence[Stroke], earlier: list[np.ndarray], spread: tuple[float, float]) -> list[Stroke]:
+def without_repeats(pieces: Sequence[Line], earlier: list[np.ndarray], spread: tuple[float, float]) -> list[Line]:
     """The strokes without unstable parts that lie upon earlier ones: dashes upon dashes would look like a solid line.
 
     A branch that goes through its parent comes back as the same motion, shifted, at the same amplitude. `spread`: width
@@ -143,7 +115,7 @@ def without_repeats(pieces: Sequence[Stroke], earlier: list[np.ndarray], spread:
     """
     from scipy.spatial.distance import cdist
 
-    kept: list[Stroke] = []
+    kept: list[Line] = []
     for piece in pieces:
         if piece.stable is not False or piece.x.size < 2:
             kept.append(piece)
@@ -158,7 +130,7 @@ def without_repeats(pieces: Sequence[Stroke], earlier: list[np.ndarray], spread:
             fresh[i] = not len(there) or cdist(probes, there).min(axis=1).max() > _UPON
         earlier.append(own)
         cuts = np.flatnonzero(np.diff(np.concatenate([[False], fresh, [False]])))
-        kept += [piece.part(a, b) for a, b in cuts.reshape(-1, 2)]
+        kept += [piece.stroke(a, b, False) for a, b in cuts.reshape(-1, 2)]
     return kept
 
 
@@ -200,6 +172,54 @@ def bent(x: np.ndarray, y: np.ndarray, spread: tuple[float, float]) -> tuple[np.
     whole = np.concatenate(parts) * spread
     whole[0], whole[-1] = (x[vertices[0]], y[vertices[0]]), (x[-1], y[-1])
     return whole[:, 0], whole[:, 1]
+
+
+#: places along a loop of a surface, from its largest to its least frequency
+_SAMPLES = 60
+
+
+def surface(loops: Sequence[np.ndarray], tips: Sequence[np.ndarray] = ()) -> np.ndarray | None:
+    """The grid (3, rows, columns) through loops and points that they shrink to, in the order of the parameter.
+
+    Each loop is cut at its least and its largest frequency into two arcs, and the places at equal shares of their
+    lengths are joined from loop to loop. In between that is interpolation: a picture of how the loops hang together.
+
+    `loops`, (3, vertices) each: frequency and parameter, in either order, and the quantity upwards, once around;
+    `tips`, (3,) each. None where there are fewer than two rows.
+    """
+    if not loops or len(loops) + len(tips) < 2:
+        return None
+    along = 0 if np.ptp(loops[0][0]) > 0.0 else 1
+    scale = np.max([np.ptp(loop, axis=1) for loop in loops], axis=0)[:, None]
+    scale[scale == 0.0] = 1.0
+    rows: list[np.ndarray] = []
+    for loop in sorted(loops, key=lambda loop: float(loop[1 - along][0])):
+        both = _arcs(loop, along, scale)
+        if rows:
+            far = [float(np.sum(((arcs - rows[-1]) / scale)[[along, 2]] ** 2)) for arcs in both]
+        else:  # the first one begins with its upper arc
+            far = [-float(np.mean(arcs[2, :_SAMPLES])) for arcs in both]
+        rows.append(both[int(np.argmin(far))])
+    for tip in tips:
+        rows.append(np.repeat(np.asarray(tip, dtype=float)[:, None], 2 * _SAMPLES, axis=1))
+    rows.sort(key=lambda row: float(row[1 - along][0]))
+    return np.stack(rows, axis=1)
+
+
+def _arcs(loop: np.ndarray, along: int, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The loop from its largest frequency to the least and back, (3, 2 samples), in both senses."""
+    vertices = loop[:, :-1] if np.allclose(loop[:, 0], loop[:, -1]) else loop
+    vertices = np.roll(vertices, -int(np.argmax(vertices[along])), axis=1)
+    turn = int(np.argmin(vertices[along]))
+    there, back = vertices[:, : turn + 1], np.column_stack([vertices[:, turn:], vertices[:, 0]])
+    first, second = _spread(there, scale), _spread(back, scale)
+    return np.hstack([first, second]), np.hstack([second[:, ::-1], first[:, ::-1]])
+
+
+def _spread(arc: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    """Places at equal shares of the length of an arc, (3, samples)."""
+    length = lengths((arc / scale).T)
+    return np.array([np.interp(np.linspace(0.0, length[-1], _SAMPLES), length, row) for row in arc])
 
 
 # --------------------------------------------------------------------------------------------------- parts of a drawing
@@ -267,17 +287,11 @@ def add_strokes(
     for stroke in strokes:
         at = stroke.at if floor is None else np.vstack([stroke.at[:2], np.full(stroke.at.shape[1], floor)])
         role, name, group = seen[stroke.stable]
-        texts = partial(_along, stroke, hover)
-        drawn: dict[str, Any] = {"smooth": earlier is not None, "role": role, "layer": layer, "hover": texts}
+        drawn: dict[str, Any] = {"smooth": earlier is not None, "role": role, "layer": layer}
         own = pen.along(stroke.stable if floor is None else None)
-        frame.items.append(Polyline(at, own, name=name, group=group, **drawn))
+        texts = partial(hover, stroke.point, stroke.event)
+        frame.items.append(Polyline(at, own, name=name, group=group, hover=texts, **drawn))
     return {stroke.stable for stroke in strokes}
-
-
-def _along(stroke: Stroke, hover: Callable[[], tuple[list[str], list[str]]]) -> list[str]:
-    """What is said of every vertex of a stroke."""
-    points, events = hover()
-    return [events[e] if e >= 0 else points[p] for p, e in zip(stroke.point, stroke.event, strict=True)]
 
 
 def events_of(
@@ -291,8 +305,11 @@ def events_of(
     for kind, look, every in style.marks(dataset):
         which = every[marked[every]]
         if which.size:
-            texts = partial(lambda which: [hover()[1][index] for index in which], which)
-            yield kind, look, {"at": places[:, which], "role": kind, "hover": texts}
+            yield (
+                kind,
+                look,
+                {"at": places[:, which], "role": kind, "hover": partial(hover, np.full(which.size, -1), which)},
+            )
 
 
 # ---------------------------------------------------------------------------------------------------------------- words
@@ -319,31 +336,34 @@ def differing(values: Sequence[Mapping[str, float]], digits: int = 6) -> list[li
     return [[f"{name} = {own[name]:.{digits}g}" for name in names] for own in values]
 
 
-def hover_of(dataset: xarray.Dataset) -> Callable[[], tuple[list[str], list[str]]]:
-    """What is said of the points and events of a curve: omega, free parameters, amplitude, a multiplier.
+def hover_of(dataset: xarray.Dataset) -> Callable[[np.ndarray, np.ndarray], list[str]]:
+    """What is said of vertices of a curve, by their points and events (see `Line`): omega, free parameters, amplitude,
+    a multiplier.
 
     Put together when it is first asked for: on paper nothing hovers.
     """
 
     @functools.cache
-    def texts() -> tuple[list[str], list[str]]:
-        attrs, known = dataset.attrs, dataset.sizes.get("multiplier", 0) > 0
-        plane = str(attrs.get("plane", "")).split("\n") if attrs.get("tracked") else []
-        names = ["omega", *(name for name in dict.fromkeys([*plane, str(attrs["free"])]) if name != "omega")]
+    def texts(prefix: str, which: str) -> list[str]:
+        plane = str(dataset.attrs.get("plane", "")).split("\n") if dataset.attrs.get("tracked") else []
+        names = ["omega", *(name for name in dict.fromkeys([*plane, str(dataset.attrs["free"])]) if name != "omega")]
+        columns = [coordinate(dataset, name)[bool(prefix)] for name in names]
+        known = dataset.sizes.get("multiplier", 0) > 0
         leading = dataset["multipliers"].to_numpy()[:, 0] if known else np.full(dataset.sizes["point"], np.nan)
-        multipliers, both = (leading, dataset["event_multiplier"].to_numpy()), []
-        for here, prefix, which in ((0, "", "leading"), (1, "event_", "critical")):
-            values = [(spelt(name), coordinate(dataset, name)[here]) for name in names]
-            every = []
-            for i, amplitude in enumerate(dataset[f"{prefix}amplitude"].to_numpy()):
-                lines = [f"{name} = {column[i]:.{DIGITS}g}" for name, column in values]
-                lines.append(f"amplitude = {amplitude:.7g}")
-                mu = complex(multipliers[here][i])
-                if np.isfinite(mu):
-                    shown = f"{mu.real:.5g}" if abs(mu.imag) < 1e-7 else f"{mu.real:.5g} {mu.imag:+.5g}i"
-                    lines.append(f"{which} multiplier = {shown}, modulus {abs(mu):.5g}")
-                every.append("\n".join(lines))
-            both.append(every)
-        return both[0], both[1]
+        multipliers, every = dataset["event_multiplier"].to_numpy() if prefix else leading, []
+        for i, amplitude in enumerate(dataset[f"{prefix}amplitude"].to_numpy()):
+            lines = [f"{spelt(name)} = {own[i]:.{DIGITS}g}" for name, own in zip(names, columns, strict=True)]
+            lines.append(f"amplitude = {amplitude:.7g}")
+            mu = complex(multipliers[i])
+            if np.isfinite(mu):
+                shown = f"{mu.real:.5g}" if abs(mu.imag) < 1e-7 else f"{mu.real:.5g} {mu.imag:+.5g}i"
+                lines.append(f"{which} multiplier = {shown}, modulus {abs(mu):.5g}")
+            every.append("\n".join(lines))
+        return every
 
-    return texts
+    def along(points: np.ndarray, events: np.ndarray) -> list[str]:
+        own = texts("", "leading") if (events < 0).any() else []
+        located = texts("event_", "critical") if (events >= 0).any() else []
+        return [located[e] if e >= 0 else own[p] for p, e in zip(points, events, strict=True)]
+
+    return along

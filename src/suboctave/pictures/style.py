@@ -18,6 +18,7 @@ their user gave them) differ in tint, width and dashes.
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, TypeAlias
@@ -77,7 +78,7 @@ def size_in_inches(size: str | tuple[float, float]) -> tuple[float, float]:
     try:
         if any(isinstance(value, str | bool) for value in size):
             raise TypeError
-        width, height = (float(value) for value in size)
+        width, height = map(float, size)
     except (TypeError, ValueError, OverflowError):
         raise InputError(f"size is a name ({', '.join(SIZES)}) or width and height in inches, not {size!r}") from None
     if not (0.2 < width <= 100.0 and 0.2 < height <= 100.0):
@@ -85,26 +86,18 @@ def size_in_inches(size: str | tuple[float, float]) -> tuple[float, float]:
     return width, height
 
 
-def check_text(text: str) -> None:
-    """Refuse a text with formulas between dollar signs that cannot be drawn; InputError."""
-    if "$" not in text:
-        return
-    from matplotlib.cbook import is_math_text
-    from matplotlib.mathtext import MathTextParser
-
-    if not is_math_text(text):  # a single dollar sign is itself
-        return
-    try:
-        MathTextParser("agg").parse(text)
-    except ValueError as error:
-        reason = str(error).strip().splitlines()[-1]
-        raise InputError(f"the formula in {text!r} cannot be drawn: {reason}; a plain dollar sign is \\$") from None
-
-
 def checked_text(text: str | None) -> str:
-    """A title with formulas that can be drawn, "" for none; InputError where they cannot."""
-    if text:
-        check_text(text)
+    """A text whose formulas between dollar signs can be drawn, "" for none; InputError where they cannot."""
+    if text and "$" in text:
+        from matplotlib.cbook import is_math_text
+        from matplotlib.mathtext import MathTextParser
+
+        try:
+            if is_math_text(text):  # a single dollar sign is itself
+                MathTextParser("agg").parse(text)
+        except ValueError as error:
+            reason = str(error).strip().splitlines()[-1]
+            raise InputError(f"the formula in {text!r} cannot be drawn: {reason}; a plain dollar sign is \\$") from None
     return text or ""
 
 
@@ -168,11 +161,8 @@ def curve_style(index: int) -> Pen:
 
 def places_among(keys: Sequence[Hashable], names: Sequence[str]) -> list[int]:
     """Of each curve the place of its name among those of the curves with the same key, in the order met."""
-    seen: dict[Hashable, dict[str, int]] = {}
-    return [
-        own.setdefault(name, len(own))
-        for own, name in ((seen.setdefault(key, {}), name) for key, name in zip(keys, names, strict=True))
-    ]
+    seen = defaultdict[Hashable, dict[str, int]](dict)
+    return [seen[key].setdefault(name, len(seen[key])) for key, name in zip(keys, names, strict=True)]
 
 
 @dataclass(frozen=True)
@@ -198,31 +188,28 @@ def marks(dataset: xarray.Dataset) -> list[tuple[str, KindStyle, np.ndarray]]:
     """The events of a curve by how they are marked: kind, style, which of them. Subcritical ones are hollow."""
     kinds = [str(kind) for kind in dataset["event_kind"].to_numpy()]
     hollow = [str(word) == "subcritical" for word in dataset["event_criticality"].to_numpy()]
-    groups = []
-    for kind, empty in dict.fromkeys(zip(kinds, hollow, strict=True)):
-        mark = kind_style(kind)
-        if empty:
-            mark = replace(mark, name=f"{mark.name}{SUBCRITICAL}", colour="#ffffff")
-        chosen = [i for i, pair in enumerate(zip(kinds, hollow, strict=True)) if pair == (kind, empty)]
-        groups.append((kind, mark, np.array(chosen, dtype=int)))
-    return groups
+    groups: dict[tuple[str, bool], list[int]] = {}
+    for i, pair in enumerate(zip(kinds, hollow, strict=True)):
+        groups.setdefault(pair, []).append(i)
+    return [(kind, kind_style(kind, empty), np.array(chosen)) for (kind, empty), chosen in groups.items()]
 
 
-def kind_style(kind: str) -> KindStyle:
+def kind_style(kind: str, subcritical: bool = False) -> KindStyle:
     """The style of a kind; one that is not in the table (a user's own event) gets a star and its own name."""
-    return KINDS.get(kind, KindStyle(kind, "*", "#CC79A7", MARKER_SIZE * 1.4))
+    own = KINDS.get(kind, KindStyle(kind, "*", "#CC79A7", MARKER_SIZE * 1.4))
+    return replace(own, name=f"{own.name}{SUBCRITICAL}", colour="#ffffff") if subcritical else own
 
 
 def tinted(colour: str, share: float) -> str:
     """The colour with a share of white in it."""
-    parts = [int(colour[i : i + 2], 16) for i in (1, 3, 5)]
-    return colour if not share else "#" + "".join(f"{round(part + share * (255 - part)):02x}" for part in parts)
+    mixed = (round(part + share * (255 - part)) for part in bytes.fromhex(colour[1:]))
+    return "#" + bytes(mixed).hex() if share else colour
 
 
 def rgb(colour: str) -> tuple[float, float, float]:
     """Red, green and blue of a colour, from 0 to 1."""
-    red, green, blue = (int(colour[i : i + 2], 16) / 255.0 for i in (1, 3, 5))
-    return red, green, blue
+    red, green, blue = bytes.fromhex(colour[1:])
+    return red / 255.0, green / 255.0, blue / 255.0
 
 
 # -------------------------------------------------------------------------------------------------------------- periods
@@ -250,11 +237,10 @@ def period_colour(nu: int) -> str:
 
 def styles_of_periods(periods: Sequence[int], names: Sequence[str]) -> list[Pen]:
     """The styles of curves by their periods; those of one period and one name look alike."""
-    styles = []
-    for nu, place in zip(periods, places_among(periods, names), strict=True):
-        like = curve_style(place)
-        styles.append(Pen(tinted(period_colour(nu), _TINTS[place % len(_TINTS)]), like.width, like.dash))
-    return styles
+    return [
+        replace(curve_style(place), colour=tinted(period_colour(nu), _TINTS[place % len(_TINTS)]))
+        for nu, place in zip(periods, places_among(periods, names), strict=True)
+    ]
 
 
 def several_periods(datasets: Sequence[xarray.Dataset]) -> bool:
@@ -271,6 +257,4 @@ def curve_styles(datasets: Sequence[xarray.Dataset], names: Sequence[str], by_pe
     """The styles of the curves of one frame: by period (default: where one is not that of the load), or in turn."""
     if several_periods(datasets) if by_period is None else by_period:
         return styles_of_periods([period_of(dataset) for dataset in datasets], names)
-    if len(datasets) == 1:
-        return [ONE_CURVE]
-    return [curve_style(index) for index in range(len(datasets))]
+    return [ONE_CURVE] if len(datasets) == 1 else [curve_style(index) for index in range(len(datasets))]

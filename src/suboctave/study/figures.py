@@ -19,8 +19,8 @@ from suboctave.maps.isolas.result import Isolas
 from suboctave.model.inputs import check_element
 from suboctave.model.system import System
 from suboctave.pictures import View, plot_boundaries, plot_history, plot_phase, plot_response, plot_space, plot_spectrum
+from suboctave.pictures.boundary import datasets_of
 from suboctave.pictures.options import DERIVATIVES, MotionView, as_multiple
-from suboctave.pictures.response import datasets_of
 from suboctave.pictures.style import size_in_inches
 from suboctave.results.branch import Branch
 from suboctave.results.diagram import BifurcationDiagram

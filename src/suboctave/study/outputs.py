@@ -14,7 +14,7 @@ from suboctave.atomic import free_place
 from suboctave.errors import InputError, Key
 from suboctave.maps.isolas.result import Isolas
 from suboctave.pictures.paper import SUFFIXES
-from suboctave.pictures.style import check_text
+from suboctave.pictures.style import checked_text
 from suboctave.results.branch import Branch
 from suboctave.results.diagram import BifurcationDiagram
 from suboctave.study.figures import StudyCurves, drawable
@@ -49,7 +49,7 @@ def check_outputs(outputs: Outputs, study: StudyCurves) -> Iterator[Complaint]:
         key = ("figures", index)
         names.append(((*key, "file"), figure.file, SUFFIXES))
         for where, text in figure.texts:
-            yield from (((*key, *where), why) for _, why in tried("", partial(check_text, text)))
+            yield from (((*key, *where), why) for _, why in tried("", partial(checked_text, text)))
         yield from (((*key, *where), text) for where, text in figure.check(study))
     seen: dict[str, str] = dict.fromkeys(csv_names(steps) if outputs.csv else (), "csv")
     if outputs.csv and len(seen) < len(csv_names(steps)):

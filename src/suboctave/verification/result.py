@@ -223,9 +223,10 @@ class BranchVerification(TimeResult):
         name = self.branch.name
         at = self.branch.parameter(name)
         places = np.array([(at[p.index], p.amplitude) for p in self.points]).reshape(-1, 2)
-        wrong = [(b.parameters.get(name, b.omega), b.amplitude) for b in self.bifurcations if not b.agrees]
+        bad = [(b.parameters.get(name, b.omega), b.amplitude) for b in self.bifurcations if not b.agrees]
+        wrong = np.array(bad).reshape(-1, 2)
         outcomes = [point.outcome for point in self.points]
-        return plot_verified(self.branch.to_xarray(), places, outcomes, np.array(wrong).reshape(-1, 2), path, **options)
+        return plot_verified(self.branch.to_xarray(), places, outcomes, wrong, path=path, **options)
 
     def __repr__(self) -> str:
         wrong = [*self.disagreements, *(b for b in self.bifurcations if not b.agrees)]

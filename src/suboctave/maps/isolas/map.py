@@ -457,12 +457,12 @@ class IsolaMap(PlaneMap):
 
         Options: `title`, `size`, `xlim`, `ylim`, `xlabel`, `ylabel`.
         """
-        from suboctave.pictures.isolas import plot_isola_map
+        from suboctave.pictures.maps import plot_isola_map
 
         regions = [
             (period_name(r.isola.nu), r.span.outline(), [r.border(u) for u in (False, True)]) for r in self.regions
         ]
-        return plot_isola_map(regions, (self.second, self.parameter), path, bounds=self.bounds, **options)
+        return plot_isola_map(regions, (self.second, self.parameter), path=path, bounds=self.bounds, **options)
 
     def __repr__(self) -> str:
         low, high = self.bounds

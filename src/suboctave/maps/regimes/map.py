@@ -264,13 +264,14 @@ class RegimeMap(PlaneMap):
                         yield (number, which, arc.nu, arc.isolated, *kinds, float(value), float(a), float(b))
 
     def plot(self, path: str | Path | None = None, **options: Any) -> Any:
-        """The plane coloured by regime, with the borders; options are those of `pictures.regimes.plot_regimes`."""
-        from suboctave.pictures.regimes import plot_regimes
+        """The plane coloured by regime, with the borders; options are those of `pictures.maps.plot_regimes`."""
+        from suboctave.pictures.maps import plot_regimes
 
         cells, regimes = self.raster(900, 700)
         labels = [(str(r).replace(" x ", " \u00d7 "), r.motions, r.beyond) for r in regimes]
         lines = list(self._lines())
-        return plot_regimes(cells, labels, lines, (self.omega, self.bounds), ("omega", self.parameter), path, **options)
+        plane = (self.omega, self.bounds), ("omega", self.parameter)
+        return plot_regimes(cells, labels, lines, *plane, path=path, **options)
 
     def _lines(self) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
         """The stretches of borders that stable motions end at, in the strips in which they do: kind, omega, values."""
