@@ -348,11 +348,6 @@ def plot_space(
         From where it is seen, degrees above the floor and around the vertical axis.
     title, size
         As in `suboctave.plot`.
-
-    Raises
-    ------
-    InputError
-        For what cannot be drawn, before anything is.
     """
     view = View(**dict[str, Any](options))
     for name, angle in (("elevation", elevation), ("azimuth", azimuth)):

@@ -38,6 +38,12 @@ _SIDES, _NEAR = ("middle right", "top center", "bottom center", "middle left"), 
 _FONT = {"family": "system-ui, Segoe UI, DejaVu Sans, Arial, sans-serif", "size": 13, "color": style.INK}
 _AXIS = {"showline": True, "linecolor": style.INK, "gridcolor": style.GRID, "zeroline": False}
 _LEGEND = {"orientation": "h", "yref": "container", "y": 0, "yanchor": "bottom", "x": 0, "font": {"size": 12}}
+_PAGE = {"font": _FONT, "paper_bgcolor": "white", "legend": _LEGEND}
+_SCENE = {
+    "aspectmode": "manual",
+    "aspectratio": {"x": 1.5, "y": 1.15, "z": 0.95},
+    "camera": {"eye": {"x": 1.05, "y": -1.75, "z": 0.9}, "center": {"x": 0, "y": 0, "z": -0.2}},
+}
 _MATH = ((r"\omega", spelt("omega")), (r"\max\,", "max "), (r"\,", " "))
 
 
@@ -100,12 +106,10 @@ def _lines(items: Sequence[Polyline]) -> dict[str, Any]:
     pen, gap = items[0].pen, np.full((len(items[0].at), 1), np.nan)
     at = np.hstack([part for item in items for part in (item.at, gap)])[:, :-1]
     texts = [text for item in items for text in [*(item.hover() if item.hover else [""] * item.at.shape[1]), ""]][:-1]
-    if len(at) == 3:
-        line = {"color": pen.colour, "width": _LINE_IN_SPACE * pen.width, "dash": _dash(pen, "dash")}
-    else:
-        line = {"color": pen.colour, "width": _LINE * pen.width, "dash": _dash(pen)}
-    hover = {"text": [_broken(text) for text in texts], "hovertemplate": _template(items[0].name)}
-    return {"type": _type(at), "mode": "lines", **_coordinates(at), **hover, "connectgaps": False, "line": line}
+    in_space = len(at) == 3
+    width = (_LINE_IN_SPACE if in_space else _LINE) * pen.width
+    line = {"color": pen.colour, "width": width, "dash": _dash(pen, "dash" if in_space else "")}
+    return {**_scatter(at, "lines", items[0].name, texts), "connectgaps": False, "line": line}
 
 
 def _markers(item: Markers | Beads, at: np.ndarray) -> dict[str, Any]:
@@ -115,12 +119,18 @@ def _markers(item: Markers | Beads, at: np.ndarray) -> dict[str, Any]:
     else:
         look = {"symbol": SYMBOLS[mark.marker], "size": _MARK * mark.size}
     edge = {"color": mark.edge, "width": _RIM * mark.rim}
+    texts = item.hover() if item.hover and item.name else []
+    return {**_scatter(at, "markers", item.name, texts), "marker": {**look, "color": mark.face, "line": edge}}
+
+
+def _scatter(at: np.ndarray, mode: str, name: str, texts: Sequence[str]) -> dict[str, Any]:
+    """A trace through places, (axes, places), with the texts under the mouse."""
     hover: dict[str, Any] = {"hoverinfo": "skip"}
-    if item.name:
-        texts = [_broken(text) for text in item.hover()] if item.hover else []
-        hover = {"text": texts, "hovertemplate": _template(item.name, bool(texts))}
-    marker = {**look, "color": mark.face, "line": edge}
-    return {"type": _type(at), "mode": "markers", **_coordinates(at), **hover, "marker": marker}
+    if name or mode == "lines":
+        template = html_of(name) + ("<br>%{text}" if texts or mode == "lines" else "") + "<extra></extra>"
+        broken = [html.escape(text).replace("\n", "<br>") for text in texts]
+        hover = {"text": broken, "hovertemplate": template}
+    return {"type": "scatter3d" if len(at) == 3 else "scatter", "mode": mode, **_coordinates(at), **hover}
 
 
 def _labels(labels: Sequence[Label], axes: Sequence[Axis]) -> dict[str, Any]:
@@ -142,18 +152,6 @@ def _labels(labels: Sequence[Label], axes: Sequence[Axis]) -> dict[str, Any]:
         "hoverinfo": "skip",
         "showlegend": False,
     }
-
-
-def _type(at: np.ndarray) -> str:
-    return "scatter3d" if len(at) == 3 else "scatter"
-
-
-def _template(name: str, with_text: bool = True) -> str:
-    return html_of(name) + ("<br>%{text}" if with_text else "") + "<extra></extra>"
-
-
-def _broken(text: str) -> str:
-    return html.escape(text).replace("\n", "<br>")
 
 
 def _dash(pen: style.Pen, name: str = "") -> str:
@@ -182,31 +180,19 @@ def _plane(drawing: Drawing) -> dict[str, Any]:
     across, upwards = (_axis(axis, mirror=True, ticks="inside") for axis in drawing.axes)
     across["title"]["standoff"] = 8
     return {
-        "font": _FONT,
+        **_PAGE,
         "margin": {"l": 64, "r": 12, "t": 34, "b": 52},
-        "paper_bgcolor": "white",
         "plot_bgcolor": "white",
         "hovermode": "closest",
         "hoverlabel": {"align": "left"},
         "xaxis": {**across, "automargin": True},
         "yaxis": upwards,
-        "legend": _LEGEND,
     }
 
 
 def _space(drawing: Drawing) -> dict[str, Any]:
-    return {
-        "font": _FONT,
-        "margin": {"l": 0, "r": 0, "t": 34, "b": 0},
-        "paper_bgcolor": "white",
-        "legend": _LEGEND,
-        "scene": {
-            **{f"{letter}axis": _axis(axis) for letter, axis in zip("xyz", drawing.axes, strict=True)},
-            "aspectmode": "manual",
-            "aspectratio": {"x": 1.5, "y": 1.15, "z": 0.95},
-            "camera": {"eye": {"x": 1.05, "y": -1.75, "z": 0.9}, "center": {"x": 0, "y": 0, "z": -0.2}},
-        },
-    }
+    axes = {f"{letter}axis": _axis(axis) for letter, axis in zip("xyz", drawing.axes, strict=True)}
+    return {**_PAGE, "margin": {"l": 0, "r": 0, "t": 34, "b": 0}, "scene": {**axes, **_SCENE}}
 
 
 def html_of(text: str) -> str:

@@ -233,6 +233,13 @@ class Drawing:
         return {name: every[name] for name in sorted(every, key=rank)}
 
 
+def spread(at: np.ndarray) -> tuple[float, float]:
+    """Width and height of places, (axes, places); 1 for none."""
+    known = [row[np.isfinite(row)] for row in at[:2]]
+    width, height = ((float(np.ptp(row)) if row.size else 0.0) or 1.0 for row in known)
+    return width, height
+
+
 def lengths(path: np.ndarray) -> np.ndarray:
     """Lengths along a polyline (vertices, axes) from its beginning to each vertex."""
     return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])

@@ -88,11 +88,6 @@ def plot_brute_force(
         Ways to start that are shown; default all.
     dof
         Degree of freedom; default the observed one.
-
-    Raises
-    ------
-    InputError
-        For what cannot be drawn, before anything is.
     """
     check_quantity(quantity, ("amplitude", "section"))
     if curves is not None and quantity != "amplitude":
@@ -140,11 +135,6 @@ def plot_stepped_sine(
         Which multiple of omega; which degree of freedom (default the observed one).
     xlim, ylim
         Part of the axes that is shown, (from, to); default the frequencies of the test, and all amplitudes.
-
-    Raises
-    ------
-    InputError
-        For what cannot be drawn, before anything is.
     """
     dof = checked_dof(test, dof)
     harmonic = as_multiple(harmonic)

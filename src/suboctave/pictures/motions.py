@@ -59,11 +59,6 @@ def plot_phase(motions: Any, path: str | Path | None = None, **options: Unpack[M
         these.
     path
         Where the figure is saved: .png, .svg or .pdf, fonts embedded.
-
-    Raises
-    ------
-    InputError
-        For what cannot be drawn, before anything is.
     """
     drawn = MotionDrawing(motions, path, options, ["displacement"], _PORTRAIT)
     datasets, view = drawn.datasets, drawn.view
@@ -92,11 +87,6 @@ def plot_history(motions: Any, path: str | Path | None = None, **options: Unpack
     ----------
     motions, path
         As in `plot_phase`.
-
-    Raises
-    ------
-    InputError
-        For what cannot be drawn, before anything is.
     """
     drawn = MotionDrawing(motions, path, options, [*DERIVATIVES, "force"], _HISTORY, stacked=True)
     datasets, view = drawn.datasets, drawn.view
@@ -108,7 +98,9 @@ def plot_history(motions: Any, path: str | Path | None = None, **options: Unpack
     longest = max(float(data["time"].to_numpy()[-1]) * unit for data, unit in zip(datasets, units, strict=True))
     for index in drawn.lower_first:
         data, unit = datasets[index], units[index]
-        time, values = data["time"].to_numpy() * unit, _values(data, view)
+        row = list(data["element"].to_numpy()).index(view.element) if view.quantity == "force" else ...
+        values = data[view.quantity].to_numpy()[row] * view.factor(DERIVATIVES.get(view.quantity, 0))
+        time = data["time"].to_numpy() * unit
         at = data["section_time"].to_numpy() * unit
         drawn.add_motion(index, np.array([time, values]), np.array([at, np.interp(at, time, values)]))
         for repeated in range(1, math.ceil(longest / time[-1] - 1e-9)):
@@ -126,13 +118,6 @@ def plot_history(motions: Any, path: str | Path | None = None, **options: Unpack
     else:
         upwards = view.name(datasets[0], DERIVATIVES[view.quantity])
     return drawn.figure(across, Axis(upwards))
-
-
-def _values(dataset: xarray.Dataset, view: MotionView) -> np.ndarray:
-    if view.quantity == "force":
-        row = list(dataset["element"].to_numpy()).index(view.element)
-        return np.asarray(dataset["force"].to_numpy()[row] * view.factor())
-    return np.asarray(dataset[view.quantity].to_numpy() * view.factor(DERIVATIVES[view.quantity]))
 
 
 class MotionDrawing:
@@ -206,15 +191,16 @@ class MotionDrawing:
 
     def add_gaps(self, upright: bool) -> None:
         """Add thin lines at the gaps that the widest of the motions reaches, or nearly so."""
-        pen, drawn = Pen(style.SOFT, 0.6), set()
+        pen = Pen(style.SOFT, 0.6)
         reach = 1.25 * max(float(dataset.attrs["amplitude"]) for dataset in self.datasets)
-        for index, dataset in enumerate(self.datasets):
-            for level in np.unique(dataset["gap_level"].to_numpy()):
-                if abs(level) > reach or (id(self.frame(index)), float(level)) in drawn:
-                    continue
-                drawn.add((id(self.frame(index)), float(level)))
-                line = Guide(float(level) * self.view.factor(), pen, upright, role="gap", layer=1.0)
-                self.frame(index).items.append(line)
+        levels = {
+            (index if len(self.frames) > 1 else 0, float(level))
+            for index, dataset in enumerate(self.datasets)
+            for level in np.unique(dataset["gap_level"].to_numpy())
+        }
+        for place, level in sorted(levels):
+            if abs(level) <= reach:
+                self.frames[place].items.append(Guide(level * self.view.factor(), pen, upright, role="gap", layer=1.0))
                 self.last.setdefault("gaps", Entry(pen))
 
     def figure(self, across: Axis, upwards: Axis) -> Figure:
@@ -293,11 +279,6 @@ def plot_spectrum(
         As in `plot_phase`.
     highest
         Highest multiple of omega that is shown; default all that was solved for and some of what was neglected.
-
-    Raises
-    ------
-    InputError
-        For what cannot be drawn, before anything is.
     """
     if highest is not None and not (isinstance(highest, int | float) and math.isfinite(highest) and highest > 0):
         raise InputError(f"highest must be a positive multiple of omega, not {highest!r}")

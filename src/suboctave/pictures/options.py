@@ -272,11 +272,9 @@ class Coordinates:
 
     def of(self, dataset: xarray.Dataset) -> tuple[np.ndarray, np.ndarray]:
         """Positions of the points, (axes, points), and of the events, (axes, events), as the axes show them."""
-        variable = self.view.variable
+        known = (self.view.variable, f"event_{self.view.variable}")
         columns = [
-            coordinate(dataset, name)
-            if name is not None
-            else (dataset[variable].to_numpy(), dataset[f"event_{variable}"].to_numpy())
+            [dataset[part].to_numpy() for part in known] if name is None else coordinate(dataset, name)
             for name in self.names
         ]
         factors = self.factors[:, None]

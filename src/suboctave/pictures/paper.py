@@ -35,6 +35,7 @@ from suboctave.pictures.drawing import (
     Raster,
     Region,
     Surface,
+    spread,
 )
 from suboctave.pictures.options import PageOptions
 from suboctave.pictures.strokes import bent
@@ -156,17 +157,16 @@ def _place(figure: Figure, frames: Sequence[Axes], drawing: Drawing, sheet: styl
 def draw(axes: Any, frame: Frame, look: style.Look) -> None:
     """Draw what stands in a frame, but for what is spaced on paper and for labels."""
     seen = [item.at for item in frame.items if isinstance(item, Polyline | Markers)]
-    known = [row[np.isfinite(row)] for row in np.concatenate(seen, axis=1)] if seen else [np.zeros(1)] * 2
-    width, height = ((float(np.ptp(row)) if row.size else 0.0) or 1.0 for row in known[:2])
+    around = spread(np.concatenate(seen, axis=1)) if seen else (1.0, 1.0)
     for item in frame.items:
-        _draw(axes, item, look, (width, height))
+        _draw(axes, item, look, around)
 
 
-def _draw(axes: Any, item: Item, look: style.Look, spread: tuple[float, float]) -> None:
+def _draw(axes: Any, item: Item, look: style.Look, around: tuple[float, float]) -> None:
     placed: dict[str, Any] = {"zorder": item.layer, "gid": item.role}
     match item:
         case Polyline():
-            at = bent(item.at[0], item.at[1], spread) if item.smooth else item.at
+            at = bent(item.at[0], item.at[1], around) if item.smooth else item.at
             axes.plot(*at, **_line(item.pen, look), **placed)
         case Markers():
             axes.plot(*item.at, clip_on=item.cut, linestyle="none", **_marker(item.mark, look), **placed)

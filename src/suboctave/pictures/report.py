@@ -12,7 +12,7 @@ import gzip
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -58,18 +58,11 @@ class Figure:
     words: str
 
 
-@dataclass(frozen=True)
-class Curve:
-    """One curve: heading, figure, and the dataset, of which the template reads tables and sentences."""
-
-    heading: str
-    figure: Figure
-    dataset: xarray.Dataset
-
-
 @dataclass
 class Section:
-    """A part of the page: sentences before and after a table, notes, figures, a tree of branches, curves."""
+    """A part of the page: sentences before and after a table, notes, figures, a tree of branches, and curves: heading,
+    figure, and the dataset, of which the template reads tables and sentences.
+    """
 
     heading: str
     anchor: str = ""
@@ -79,7 +72,7 @@ class Section:
     notes: Sequence[str] = ()
     figures: Sequence[Figure] = ()
     tree: str = ""
-    curves: list[Curve] = field(default_factory=list)
+    curves: Sequence[tuple[str, Figure, xarray.Dataset]] = ()
 
 
 def write_report(
@@ -118,7 +111,6 @@ def write_report(
         section.anchor = anchors[name]
         sections.append(section)
     every = [dataset for own in datasets.values() for dataset in own.values()]
-    drawn = any(section.figures or section.curves for section in sections)
     versions = sorted({str(data.attrs["suboctave"]) for data in every if "suboctave" in data.attrs})
     systems = dict.fromkeys(str(data.attrs["system"]) for data in every if data.attrs.get("system"))
     text = _template().render(
@@ -127,7 +119,7 @@ def write_report(
         origin=" · ".join([f"suboctave {', '.join(versions) or __version__}", *systems]),
         links=[(anchors[name], name) for name in datasets] if len(datasets) > 1 else [],
         sections=sections,
-        plotly=_plotly() if drawn else "",
+        plotly=_plotly() if any(section.figures or section.curves for section in sections) else "",
     )
     replace_file(target, lambda place: place.write_text(text, encoding="utf-8"))
     return target
@@ -213,9 +205,9 @@ def _isolas(name: str, head: xarray.Dataset, curves: Mapping[str, xarray.Dataset
     return Section(name, table=isolas_table(head), figures=figures, curves=each, **texts)
 
 
-def _curve(name: str, dataset: xarray.Dataset, heading: str = "") -> Curve:
+def _curve(name: str, dataset: xarray.Dataset, heading: str = "") -> tuple[str, Figure, xarray.Dataset]:
     draw = _boundaries if is_boundary(dataset) else _responses
-    return Curve(heading, draw({name: dataset}), dataset)
+    return heading, draw({name: dataset}), dataset
 
 
 def _overviews(curves: Mapping[str, xarray.Dataset]) -> Iterator[Section]:
@@ -318,11 +310,12 @@ def bifurcations(dataset: xarray.Dataset) -> Table:
     """The located events of a curve, in the order met."""
     names = plane_of(dataset) if is_boundary(dataset) else (str(dataset.attrs["free"]),)
     own, remarks = ("kind", "ω", "max |x|", "multiplier", "residual", "remark"), _remarks(dataset)
-    kind, omega, amplitude, multiplier, residual = (
+    kinds, omega, amplitude, multiplier, residual = (
         dataset[f"event_{name}"].to_numpy() for name in ("kind", "omega", "amplitude", "multiplier", "residual")
     )
+    words = [(kind, style.kind_style(kind).name) for kind in map(str, kinds)]
     columns: list[tuple[str, str, Sequence[str]]] = [
-        ("kind", _TEXT, [_kind_words(str(name)) for name in kind]),
+        ("kind", _TEXT, [f"{k} ({n})" if k.isupper() and n != k else n for k, n in words]),
         ("ω", "", _texts(omega)),
         *((parameter_column(n, own), "", _texts(coordinate(dataset, n)[1])) for n in names if n != "omega"),
         ("max |x|", "", _texts(amplitude, 7)),
@@ -330,11 +323,6 @@ def bifurcations(dataset: xarray.Dataset) -> Table:
         ("residual", "", [_small(value) for value in residual]),
     ]
     return Table([*columns, ("remark", "long", remarks)] if any(remarks) else columns)
-
-
-def _kind_words(kind: str) -> str:
-    name = style.kind_style(kind).name
-    return f"{kind} ({name})" if kind.isupper() and name != kind else name
 
 
 def _remarks(dataset: xarray.Dataset) -> list[str]:
@@ -375,15 +363,12 @@ def _critical_multipliers(dataset: xarray.Dataset) -> np.ndarray:
     """Which multipliers are those that make the points bifurcations, (points, multipliers), bool: one at LP, BP and PD,
     a pair at NS, none at grazings.
     """
-    mu, kind = dataset["multipliers"].to_numpy(), kind_of(dataset)
-    critical = np.zeros(mu.shape, dtype=bool)
-    target, count = KINDS[kind].multiplier, KINDS[kind].critical
+    mu, row = dataset["multipliers"].to_numpy(), KINDS[kind_of(dataset)]
     # a pair that becomes real in a resonance is at the circle still
-    distance = np.abs(np.abs(mu) - 1.0) if target is None else np.abs(mu - target)
-    distance = np.where(np.isnan(distance), np.inf, distance)
-    rows = np.arange(len(mu))
-    for place in np.argsort(distance, axis=1, kind="stable")[:, :count].T:
-        critical[rows, place] = True
+    distance = np.abs(np.abs(mu) - 1.0) if row.multiplier is None else np.abs(mu - row.multiplier)
+    nearest = np.argsort(np.where(np.isnan(distance), np.inf, distance), axis=1, kind="stable")[:, : row.critical]
+    critical = np.zeros(mu.shape, dtype=bool)
+    np.put_along_axis(critical, nearest, True, axis=1)
     return critical
 
 
@@ -409,16 +394,16 @@ def origin_of(dataset: xarray.Dataset) -> list[tuple[str, str]]:
     if "stability_method" in dataset:
         methods = dict.fromkeys(str(method) for method in dataset["stability_method"].to_numpy())
         pairs.append(("stability from", "; ".join(methods)))
-    return pairs + [pair for pair in _attributes(dataset) if not _is_long(pair[1])]
+    return pairs + [*filter(_fits, _attributes(dataset))]
 
 
 def records_of(dataset: xarray.Dataset) -> list[tuple[str, str]]:
     """Attributes of a curve that are too long for a line, by name."""
-    return [pair for pair in _attributes(dataset) if _is_long(pair[1])]
+    return [pair for pair in _attributes(dataset) if not _fits(pair)]
 
 
-def _is_long(text: str) -> bool:
-    return len(text) > _LONG or "\n" in text
+def _fits(pair: tuple[str, str]) -> bool:
+    return len(pair[1]) <= _LONG and "\n" not in pair[1]
 
 
 def _attributes(dataset: xarray.Dataset) -> list[tuple[str, str]]:
@@ -445,10 +430,13 @@ def isolas_table(head: xarray.Dataset) -> Table | None:
 
 def notes_on_isolas(head: xarray.Dataset) -> tuple[list[str], list[str]]:
     """What happens at the ends of isolas, and what stayed open."""
-    name, sentences = parameter_of(head), []
-    for number, reasons in enumerate(zip(head["at_from"].to_numpy(), head["at_to"].to_numpy(), strict=True)):
-        for key, reason in zip(("from", "to"), reasons, strict=True):
-            sentences.append(f"Isola {number}, {name} = {float(head[key].to_numpy()[number]):.7g}: {reason}.")
+    name = parameter_of(head)
+    sentences = [
+        f"Isola {number}, {name} = {float(head[key][number]):.7g}: {reason}."
+        for number in range(head.sizes["isola"])
+        for key in ("from", "to")
+        for reason in [head[f"at_{key}"].to_numpy()[number]]
+    ]
     notes = [f"Isola {i}: {note}" for i, text in enumerate(head["notes"].to_numpy()) for note in str(text).splitlines()]
     return sentences, notes + str(head.attrs.get("notes", "")).splitlines()
 
@@ -456,12 +444,7 @@ def notes_on_isolas(head: xarray.Dataset) -> tuple[list[str], list[str]]:
 def columns_of(dataset: xarray.Dataset) -> Table:
     """A result that is no curve: its columns as they are."""
     columns = {str(name): data.to_numpy() for name, data in dataset.data_vars.items() if data.dims == ("row",)}
-    return Table(
-        [
-            (name, _TEXT if column.dtype.kind in "OU" else "", [_cell(value) for value in column])
-            for name, column in columns.items()
-        ]
-    )
+    return Table([(n, _TEXT if c.dtype.kind in "OU" else "", [_cell(v) for v in c]) for n, c in columns.items()])
 
 
 def _texts(values: np.ndarray, digits: int = 9) -> list[str]:

@@ -24,7 +24,7 @@ from suboctave.pictures.boundary import (
     plot_boundaries,
     several_of,
 )
-from suboctave.pictures.drawing import Axis, Drawing, Entry, Frame, Markers, Ticks, plain
+from suboctave.pictures.drawing import Axis, Drawing, Entry, Frame, Markers, Ticks, plain, spread
 from suboctave.pictures.options import Coordinates, CurveOptions, View
 from suboctave.pictures.paper import draw, dress, figure_of, handles
 from suboctave.pictures.strokes import (
@@ -164,9 +164,7 @@ def response_frame(
     titles = names if called is None else [plain(name) for name in called]
     # sub-harmonic motions over those that they branch off from
     order = sorted(range(len(group)), key=lambda index: period_of(group[index])) if periods else range(len(group))
-    at = np.concatenate([axes.of(dataset)[0] for dataset in group], axis=1)
-    known = [row[np.isfinite(row)] for row in at]
-    width, height = ((float(np.ptp(row)) if row.size else 0.0) or 1.0 for row in known)
+    around = spread(np.concatenate([axes.of(dataset)[0] for dataset in group], axis=1))
     earlier: dict[Pen, list[np.ndarray]] = {}
     frame = Frame()
     for index in order:
@@ -176,7 +174,7 @@ def response_frame(
         curve = titles[index] if several else ""
         words = {**_ROLES, None: "motions"}
         seen = {s: (_ROLES[s], f"{curve}: {words[s]}" if curve else words[s], curve or words[s]) for s in _ROLES}
-        for stable in add_strokes(frame, dataset, axes, pen, seen, earlier=earlier, spread=(width, height)) - {None}:
+        for stable in add_strokes(frame, dataset, axes, pen, seen, earlier=earlier, spread=around) - {None}:
             # where ink is the colour of one period, the dashes are shown in a colour of none
             plain_pen = Pen(style.SOFT if periods else style.INK, 1.0, style.UNSTABLE_DASH)
             frame.entries[_ROLES[stable]] = Entry(plain_pen.along(stable))
@@ -214,18 +212,22 @@ def _names_and_pens(
     group: Sequence[xarray.Dataset], labels: Sequence[str] | None, by_period: bool
 ) -> tuple[list[str], list[Pen]]:
     """Of response curves what tells them apart, and pens by period or in turn; of tracked curves their kinds'."""
-    tracked = [i for i, dataset in enumerate(group) if is_boundary(dataset)]
-    responses = [i for i in range(len(group)) if i not in tracked]
-    bounds, others = [group[i] for i in tracked], [group[i] for i in responses]
-    names, pens = dict(enumerate(labels or ())), dict[int, Pen]()
+    bounds, others = ([data for data in group if is_boundary(data) is kind] for kind in (True, False))
+    names = list(labels or ())
     if labels is None:
-        names |= zip(tracked, boundary_names(bounds), strict=True)
-        alone = tracked and len(responses) == 1
-        names |= zip(responses, ["response"] if alone else _tell_apart(others, by_period), strict=True)
-    names = {i: plain(name) for i, name in names.items()}
-    pens |= zip(tracked, boundary_styles(bounds, [names[i] for i in tracked]), strict=True)
-    pens |= zip(responses, curve_styles(others, [names[i] for i in responses], by_period), strict=True)
-    return [names[i] for i in range(len(group))], [pens[i] for i in range(len(group))]
+        alone = ["response"] if bounds and len(others) == 1 else _tell_apart(others, by_period)
+        own = {True: iter(boundary_names(bounds)), False: iter(alone)}
+        names = [next(own[is_boundary(data)]) for data in group]
+    names = [plain(name) for name in names]
+    known = {
+        kind: [name for name, data in zip(names, group, strict=True) if is_boundary(data) is kind]
+        for kind in (True, False)
+    }
+    pens = {
+        True: iter(boundary_styles(bounds, known[True])),
+        False: iter(curve_styles(others, known[False], by_period)),
+    }
+    return names, [next(pens[is_boundary(data)]) for data in group]
 
 
 def _tell_apart(datasets: Sequence[xarray.Dataset], by_period: bool = False) -> list[str]:
@@ -278,11 +280,6 @@ def plot(
         Names of the curves in the legend, title.
     size
         "single-column" (84 mm), "double-column" (174 mm), or width and height in inches.
-
-    Raises
-    ------
-    InputError
-        For what cannot be drawn, before anything is.
     """
     given = several_of(curves)
     if len(given) == 1:  # a diagram says how it is drawn
