@@ -7,9 +7,8 @@ import pytest
 
 import suboctave as so
 from suboctave.floquet import hill
-from suboctave.floquet.hill import transition
+from suboctave.floquet.hill import Variational, transition, two_sided
 from suboctave.floquet.monodromy import floquet_multipliers
-from suboctave.floquet.variational import Variational, two_sided
 from suboctave.harmonic import HarmonicBalance, HarmonicBasis
 from suboctave.timedomain import shoot
 

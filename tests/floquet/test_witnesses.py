@@ -7,8 +7,7 @@ import pytest
 from slow import slow
 
 import suboctave as so
-from suboctave.floquet.hill import transition
-from suboctave.floquet.variational import Variational
+from suboctave.floquet.hill import Variational, transition
 from suboctave.harmonic import HarmonicBalance, HarmonicBasis
 from suboctave.timedomain import integrate, shoot
 

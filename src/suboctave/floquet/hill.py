@@ -1,6 +1,15 @@
 """Hill's method: characteristic exponents as eigenvalues in the frequency domain, selected by strip.
 
-Perturbations `y = exp(lambda t) sum_k phi_k exp(i k w0 t)` of the linearised motion (`variational`) solve
+The linearised motion as Fourier series is
+
+    y'' + C(t) y' + K(t) y = 0,    K(t) = K_0 + sum_g k_g(t) l_g r_g^T,    C(t) = C_0 + sum_g c_g(t) l_g r_g^T
+
+in DOFs weighted by the square roots of their masses; one term per direction that elements act along, k_g and c_g the
+sums of their tangents f_u and f_v along the motion. Fourier coefficients of tangents are exact to any order. The motion
+itself is known up to its neglected harmonics. `refined` adds their first-order answer and what that does to the
+harmonics that were solved for: near a limit point, where R_X is nearly singular, that is the larger part.
+
+Perturbations `y = exp(lambda t) sum_k phi_k exp(i k w0 t)` of it solve
 
     [ s_k^2 + s_k C_0 + K_0 ] phi_k + sum_l [ k_{k-l} + s_l c_{k-l} ] l r^T phi_l = 0,    s_k = lambda + i k w0,
 
@@ -24,7 +33,7 @@ error estimate.
 
 The Koopman-Hill projection: the monodromy matrix from Hill's matrix without choosing among eigenvalues.
 
-Let `y' = A(t) y` be the linearised motion (`variational`). Its solutions times waves, `z_k = exp(-i k w0 t) y`, solve
+Let `y' = A(t) y` be the linearised motion. Its solutions times waves, `z_k = exp(-i k w0 t) y`, solve
 
     z_k' = sum_l A_{k-l} z_l - i k w0 z_k,    z_k(0) = I,    Phi(T) = z_0(T) = C exp(H T) W,
 
@@ -44,17 +53,136 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from scipy.linalg import expm
 
 from suboctave.continuation.linear import Factor
 from suboctave.floquet.result import FloquetResult
-from suboctave.floquet.variational import Variational, liouville, refined, two_sided
 from suboctave.harmonic.assembly import galerkin
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.interruption import check_time
+
+
+@dataclass(frozen=True)
+class Variational:
+    """The linearised motion.
+
+    damping, stiffness
+        C_0, K_0, shape (n, n): those of the structure and the means of the elements' tangents.
+    left, right
+        l_g, r_g, shape (G, n).
+    k, c
+        Fourier coefficients q = 0 .. top of k_g, c_g without their means, shape (G, top + 1).
+    rate
+        Base frequency omega / nu.
+    """
+
+    damping: Array
+    stiffness: Array
+    left: Array
+    right: Array
+    k: ComplexArray
+    c: ComplexArray
+    rate: float
+
+    @property
+    def n(self) -> int:
+        """Number of DOFs of the equation of motion."""
+        return self.stiffness.shape[0]
+
+    @property
+    def decay(self) -> float:
+        """Logarithm of the product of all multipliers, `-int trace C dt` (Liouville)."""
+        return -float(np.trace(self.damping)) * (2.0 * math.pi / self.rate)
+
+    def mean_exponents(self) -> ComplexArray:
+        """Characteristic exponents of the mean system `y'' + C_0 y' + K_0 y = 0`, shape (2 n,)."""
+        zero, one = np.zeros((self.n, self.n)), np.eye(self.n)
+        return np.linalg.eigvals(np.block([[zero, one], [-self.stiffness, -self.damping]])).astype(complex)
+
+    @classmethod
+    def of(cls, state: BalanceState, top: int) -> Variational:
+        """The motion's linearisation with Fourier coefficients up to `top`."""
+        mass, damping, stiffness = state.linear.equation_of_motion()
+        weight = np.sqrt(np.diag(mass))
+        inverse = np.linalg.inv(mass) * weight[:, None]
+        damping, stiffness = inverse @ damping / weight, inverse @ stiffness / weight
+        count = sum(channel.count for channel in state.channels)
+        left, right = np.zeros((2, count, len(mass)))
+        k, c = np.zeros((2, count, top + 1), dtype=complex)
+        i = 0
+        for channel in state.channels:
+            reaching = channel.reaching(top)
+            for j, direction in enumerate(channel.ins):
+                left[i] = inverse @ state.linear.expand(channel.out)
+                right[i] = state.linear.expand(direction) / weight
+                k[i] = reaching.stiffness(j)
+                if channel.moving:
+                    c[i] = reaching.damping(j)
+                i += 1
+        for i in range(count):
+            outer = np.outer(left[i], right[i])
+            stiffness, damping = stiffness + k[i, 0].real * outer, damping + c[i, 0].real * outer
+        k[:, 0] = c[:, 0] = 0.0
+        return cls(damping, stiffness, left, right, k, c, state.rate)
+
+
+def two_sided(spectrum: ComplexArray, harmonics: int) -> ComplexArray:
+    """Toeplitz matrix of a real function between waves k = -harmonics .. harmonics: its Fourier coefficients k - l."""
+    index = np.arange(2 * harmonics + 1)
+    both = np.concatenate((spectrum[2 * harmonics : 0 : -1].conj(), spectrum[: 2 * harmonics + 1]))
+    return both[index[:, None] - index[None, :] + 2 * harmonics]
+
+
+#: relative size up to which a first-order answer of the solved harmonics is taken at its word
+_ANSWER = 1e-3
+
+
+def refined(state: BalanceState) -> tuple[BalanceState, BalanceState | None]:
+    """The motion with 2 H + 1 harmonics, one step closer to the true one, and, if that is in doubt, another it may be.
+
+    The solved harmonics answer to the neglected ones by `-R_X^-1 R`, R the residual that these leave. At a limit point
+    that answer means nothing: there the motion moves by about the root of what disturbs it, in the same direction.
+    """
+    completed, balance, kept = state.completed, state.balance, state.x.shape[0]
+    residual = completed.residual.reshape(completed.x.shape)[:kept].ravel()
+    weight = balance.scales()[0]
+    lacking = completed.x[kept:]
+    size, gap = (float(np.linalg.norm(x * weight)) for x in (state.x, lacking))
+    try:
+        answer = np.asarray(np.linalg.solve(state.jacobian, -residual), dtype=float)
+    except np.linalg.LinAlgError:
+        answer = np.asarray(np.linalg.lstsq(state.jacobian, -residual)[0], dtype=float)
+    answer = balance.shaped(answer)
+    length = float(np.linalg.norm(answer * weight))
+    if length <= _ANSWER * size:
+        return _moved(completed, answer), None
+    return completed, _moved(completed, answer * math.sqrt(max(gap, 1e-14 * size) * size) / length)
+
+
+def _moved(completed: BalanceState, answer: Array) -> BalanceState:
+    x = completed.x.copy()
+    x[: len(answer)] += answer
+    return BalanceState(completed.balance, completed.linear, x, completed.omega, completed.values)
+
+
+def liouville(multipliers: ComplexArray, errors: Array, decay: float) -> tuple[Array, float]:
+    """Errors enlarged until they cover what Liouville's formula shows to be wrong, and that defect.
+
+    The logarithms of the multipliers add up to `decay`; to first order the relative errors of the multipliers add up to
+    the defect, so that estimates whose sum is smaller are too small.
+    """
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+        defect = abs(float(np.log(np.abs(multipliers)).sum()) - decay)
+        stated = float((errors / np.abs(multipliers)).sum())
+    if not math.isfinite(defect):
+        return errors, defect
+    return errors * max(1.0, defect / stated if stated > 0.0 else 1.0), defect
+
 
 #: harmonics reach this many times the highest natural frequency, or the eigenvalues are not good
 _REACH = 2.0
@@ -69,12 +197,10 @@ def exponents(system: Variational, harmonics: int) -> ComplexArray:
 
     In the real basis (mean, cosines, sines): `lambda^2 + lambda (2 w0 D + T(C)) + w0^2 D^2 + T(C) w0 D + T(K)`.
     """
-    n, size = system.n, 2 * harmonics + 1
-    rate = system.rate
+    n, size, rate = system.n, 2 * harmonics + 1, system.rate
     derivative = np.zeros((size, size))
     cosine = np.arange(1, size, 2)
-    derivative[cosine, cosine + 1] = np.arange(1.0, harmonics + 1.0)
-    derivative[cosine + 1, cosine] = -derivative[cosine, cosine + 1]
+    derivative[cosine, cosine + 1], derivative[cosine + 1, cosine] = (cosine + 1) / 2, -(cosine + 1) / 2
     one, each = np.eye(size), np.eye(n)
     first = np.kron(2.0 * derivative, each) + np.kron(one, system.damping / rate)
     zeroth = np.kron(derivative @ derivative, each) + np.kron(derivative, system.damping / rate)
@@ -85,8 +211,7 @@ def exponents(system: Variational, harmonics: int) -> ComplexArray:
         if c.any():
             first += np.kron(galerkin(c / rate, None, 0.0, True, harmonics + 1), outer)
     companion = np.block([[np.zeros_like(zeroth), np.eye(size * n)], [-zeroth, -first]])
-    values: ComplexArray = np.linalg.eigvals(companion).astype(complex)
-    return values
+    return np.linalg.eigvals(companion).astype(complex)
 
 
 class _Waves:
@@ -155,8 +280,7 @@ class _Waves:
 
     def continued(self, s: complex, phi: ComplexArray, transposed: bool = False) -> ComplexArray:
         """A null vector of fewer waves with the first-order answer of the others."""
-        wide = self.widened(phi)
-        more = (len(self.index) - len(phi)) // 2
+        wide, more = self.widened(phi), (len(self.index) - len(phi)) // 2
         outside = np.r_[:more, len(wide) - more : len(wide)]
         blocks = self.diagonal(s)[outside]
         drive = -self.coupled(s, wide, transposed)[outside]
@@ -165,9 +289,8 @@ class _Waves:
 
     def rayleigh(self, s: complex, psi: ComplexArray, phi: ComplexArray) -> tuple[complex, float]:
         """The root near s of the two-sided quotient `psi^T P(s) phi = 0`, and its rounding error."""
-        index = self.index[:, None]
+        index, square = self.index[:, None], complex((psi * phi).sum())
         steady, unit = self.coupled(0.0, phi), self.coupled(1.0, phi)
-        square = complex((psi * phi).sum())
         slope = complex((psi * (2.0 * index * phi + phi @ self.damping.T + unit - steady)).sum())
         terms = psi * (index**2 * phi + index * (phi @ self.damping.T) + phi @ self.stiffness.T + steady)
         constant = complex(terms.sum())
@@ -214,10 +337,15 @@ def most_central(vectors: ComplexArray, count: int) -> np.ndarray:
     return np.argsort(np.abs(harmonic @ weights) / weights.sum(axis=0), kind="stable")[:count]
 
 
+def _apart(a: ComplexArray, b: ComplexArray | complex) -> ComplexArray:
+    """Differences of exponents, shifts by i aside."""
+    difference: ComplexArray = a - b
+    return difference - 1j * np.round(difference.imag)
+
+
 def same_exponents(a: ComplexArray, b: ComplexArray) -> bool:
     """True if a has each of the exponents b once, up to shifts by i: each is the nearest of another one."""
-    difference = a[:, None] - b[None, :]
-    distance: Array = np.abs(difference - 1j * np.round(difference.imag))
+    distance: Array = np.abs(_apart(a[:, None], b))
     return len(a) == len(b) and sorted(distance.argmin(axis=1)) == list(range(len(b)))
 
 
@@ -227,30 +355,22 @@ def hill_multipliers(state: BalanceState, selection: str) -> FloquetResult:
     solved = Variational.of(state, 2 * harmonics)
     count = 2 * solved.n
     name = "Hill" if selection == "strip" else f"Hill, selection by {selection}"
+    unfit = partial(FloquetResult.inapplicable, count, name)
     highest = float(np.abs(solved.mean_exponents().imag).max())
     if harmonics * solved.rate < _REACH * highest:
-        return FloquetResult.inapplicable(
-            count,
-            name,
+        return unfit(
             f"Hill's method needs harmonics up to twice the highest natural frequency, {highest:.4g}: the motion's "
-            f"{harmonics} reach {harmonics * solved.rate:.4g}, {math.ceil(_REACH * highest / solved.rate)} would do",
+            f"{harmonics} reach {harmonics * solved.rate:.4g}, {math.ceil(_REACH * highest / solved.rate)} would do"
         )
     size = count * (2 * harmonics + 1)
     if size > _LARGEST:
-        return FloquetResult.inapplicable(
-            count, name, f"A Hill problem of {size} unknowns is larger than {_LARGEST}: use the monodromy matrix"
-        )
+        return unfit(f"A Hill problem of {size} unknowns is larger than {_LARGEST}: use the monodromy matrix")
     values = exponents(solved, harmonics)
     strip, gap = in_strip(values, harmonics)
     checks = {"inside the strip": float(len(strip)), "expected": float(count), "gap": gap}
     if len(strip) != count:
-        return FloquetResult.inapplicable(
-            count,
-            name,
-            f"{len(strip)} of Hill's eigenvalues lie in a strip that must hold {count}: with {harmonics} harmonics "
-            "they are not good enough, more are needed",
-            checks,
-        )
+        note = f"{len(strip)} of Hill's eigenvalues lie in a strip that must hold {count}: with {harmonics} harmonics "
+        return unfit(f"{note}they are not good enough, more are needed", checks)
     chosen, note = strip, ""
     if selection == "imaginary":
         chosen = smallest_imaginary(values, count)
@@ -280,9 +400,9 @@ def _second_level(state: BalanceState, solved: Variational, values: ComplexArray
     other = None if alternative is None else _Waves(Variational.of(alternative, 2 * outer), outer)
     moved, spread = np.empty_like(values), np.empty(len(values))
     for j, s in enumerate(values):
-        twin = _conjugate(values[:j], s)
-        if twin is not None:
-            moved[j], spread[j] = moved[twin].conjugate(), spread[twin]
+        twins = np.flatnonzero(np.abs(_apart(values[:j].conj(), s)) < 1e-9)  # conjugate to rounding
+        if twins.size:
+            moved[j], spread[j] = moved[twins[0]].conjugate(), spread[twins[0]]
             continue
         phi, psi = first.vectors(s)
         # the same vectors without their continuation show what the motion alone does, to be cancelled by the rest
@@ -292,26 +412,12 @@ def _second_level(state: BalanceState, solved: Variational, values: ComplexArray
         parts = abs(better - s) + _CANCELLED * (abs(middle - s) + abs(better - middle)) + rounding
         if other is not None:
             parts += abs(other.rayleigh(s, psi, phi)[0] - better)
-        near = _distance(values, j)
+        near = float(np.abs(_apart(np.delete(values, j), s)).min(initial=1.0))
         if not abs(better - s) < 0.3 * near:
             # two exponents about to meet: first order means nothing, they move by about the root
             better, parts = s, 2.0 * math.sqrt(near * parts) if math.isfinite(parts) else math.inf
         moved[j], spread[j] = better, parts
     return moved, spread
-
-
-def _conjugate(values: ComplexArray, s: complex) -> int | None:
-    """The index of an eigenvalue whose conjugate is s up to a shift by i, to rounding."""
-    difference = values.conj() - s
-    difference -= 1j * np.round(difference.imag)
-    same = np.flatnonzero(np.abs(difference) < 1e-9)
-    return int(same[0]) if same.size else None
-
-
-def _distance(values: ComplexArray, j: int) -> float:
-    """Distance of an exponent from the nearest other one, shifts by i aside."""
-    difference = np.delete(values, j) - values[j]
-    return float(np.abs(difference - 1j * np.round(difference.imag)).min(initial=1.0))
 
 
 def _closed(mu: ComplexArray, errors: Array) -> tuple[ComplexArray, Array]:
@@ -387,8 +493,7 @@ def _projected(spectrum: np.ndarray, doubled: np.ndarray, kept: int) -> Array:
     padded = np.zeros(int(doubled[-1]) + 1, dtype=complex)
     count = min(kept + 1, len(padded), len(spectrum))
     padded[:count] = spectrum[:count]
-    mean = bool(doubled[0] == 0)
-    return galerkin(padded, None, 0.0, mean, len(doubled))
+    return galerkin(padded, None, 0.0, bool(doubled[0] == 0), len(doubled))
 
 
 def _by_taylor(

@@ -78,8 +78,9 @@ _NOTHING = Probe()
 _NO_START, _NO_NODES = np.empty((0, 1)), np.empty((0, 0, 0))
 
 
-class Linearised:
-    """Stiffness, damping and unbalanced force of the elements along a motion.
+class _Linearised:
+    """A motion as it stands, with stiffness, damping and unbalanced force of the elements along it, and one step of
+    Newton's method from it.
 
     Attributes
     ----------
@@ -93,6 +94,8 @@ class Linearised:
         The channels with a force, (A,).
     varying
         Whether any stiffness or damping varies within panels.
+    before
+        Monodromy matrix along the motion as it stands, (2 n, 2 n).
     """
 
     def __init__(self, state: BalanceState) -> None:
@@ -128,7 +131,11 @@ class Linearised:
             parts, total = self._evaluated(panels)
         self.start = start
         own.locate(self.events, start, laws.owner, len(panels))
-        self._structures = structure(self.spans, *modes.matrices)
+        self._structures = structure(self.spans, modes.stiffness, modes.damping, modes.left, modes.right)
+        start = np.empty((self.size, 1))
+        self._nodes = np.empty((len(self.spans), 2 * len(self.active) * ORDER, self.size + 1))
+        self.before = self._propagated(self.law, np.zeros(self.base.shape), start, self._nodes)
+        self._start = start[:, 0] if len(self._nodes) and len(self.active) else None
 
     def _evaluated(self, panels: Array) -> tuple[np.ndarray, float]:
         """Evaluate all laws on panels; how many parts each of these needs, (P,), and how many panels that makes."""
@@ -146,17 +153,8 @@ class Linearised:
         parts, total = parts_needed(self.spans, self.law, self.base, self.active, *self._modes.rates, _LONGEST)
         return parts, total
 
-    def standing(self) -> tuple[Array, Array, Array]:
-        """Along the motion as it stands, with the unbalanced force: see `propagate`."""
-        start = np.empty((self.size, 1))
-        nodes = np.empty((len(self.spans), 2 * len(self.active) * ORDER, self.size + 1))
-        return self._propagated(self.law, np.zeros(self.base.shape), start, nodes), start[:, 0], nodes
-
-    def corrected(self, change: Array) -> Array:
-        """Monodromy matrix along the motion changed by (G, 2, N)."""
-        return self._propagated(*self._changed(change), _NO_START, _NO_NODES)
-
     def _propagated(self, law: Array, kick: Array, start: Array, nodes: Array) -> Array:
+        """The monodromy matrix; see `propagate`."""
         modes, (kinds, structures) = self._modes, self._structures
         out = np.empty((self.size, self.size))
         propagate(kinds, structures, law, self.base, kick, self.active, modes.left, modes.right, out, start, nodes)
@@ -174,6 +172,23 @@ class Linearised:
         )  # fmt: skip
         self._own.changed(self.path, change, law, self.spans)
         return law, kick
+
+    def multipliers(self, weight: float) -> tuple[ComplexArray, Array, float]:
+        """Multipliers, how far the correction has moved them, and the share of it that was taken.
+
+        weight: share of its part along the direction of the real multiplier nearest to +1.
+        """
+        share, start = 1.0, self._start
+        change = np.zeros_like(self.path)
+        if start is not None:
+            if weight < 1.0:
+                start = start - (1.0 - weight) * (projector(self.before) @ start)
+            share = response(start, self._nodes, self.active, self.path, _LARGEST, change)
+        after = self._propagated(*self._changed(change), _NO_START, _NO_NODES)
+        mu, shift = np.empty(self.size, dtype=complex), np.empty(self.size)
+        real, imaginary, left, right, _ = lapack.dgeev(after, 1, 1)
+        multipliers_and_shifts(real, imaginary, left, right, after, self.before, mu, shift)
+        return mu, shift, share
 
 
 class _Modes(NamedTuple):
@@ -198,11 +213,6 @@ class _Modes(NamedTuple):
     right: Array
     active: np.ndarray
     rates: tuple[float, float, Array]
-
-    @property
-    def matrices(self) -> tuple[Array, Array, Array, Array]:
-        """K, C, left, right."""
-        return self.stiffness, self.damping, self.left, self.right
 
 
 @lru_cache(maxsize=16)
@@ -315,8 +325,7 @@ class Channels:
 
     def _state(self, nodal: GeneralLaw, begin: int, path: Array) -> tuple[Array, Array]:
         """q (Q, N) and theta (N,) of an element at the nodes of the panels."""
-        rows = path[begin : begin + nodal.count]
-        q = np.concatenate((rows[:, 0], rows[:, 1])) if nodal.moving else rows[:, 0]
+        q = _inputs(nodal, begin, path)
         if self._clock < 0 or not nodal.harmonic:
             return np.ascontiguousarray(q), np.zeros(q.shape[1])
         cosine, slope = path[self._clock]
@@ -348,8 +357,7 @@ class Channels:
         """
         for (nodal, begin, scale), f_q in zip(self._laws, self._tangents, strict=True):
             q, theta = self._state(nodal, begin, path)
-            rows = change[begin : begin + nodal.count]
-            d = np.concatenate((rows[:, 0], rows[:, 1])) if nodal.moving else rows[:, 0]
+            d = _inputs(nodal, begin, change)
             if nodal.smoothness.sharp:
                 new = f_q + np.einsum("rsn,sn->rn", nodal.curvature(q, theta), d)
             else:
@@ -392,6 +400,12 @@ class Channels:
                 self._slices.setdefault(channel, []).append((int(start[i]), last))
 
 
+def _inputs(nodal: GeneralLaw, begin: int, path: Array) -> Array:
+    """Displacements and, if a law reads them, velocities of its inputs, (Q, N), of all channels' (G, 2, N)."""
+    rows = path[begin : begin + nodal.count]
+    return np.concatenate((rows[:, 0], rows[:, 1])) if nodal.moving else rows[:, 0]
+
+
 def _moved(nodal: GeneralLaw, q: Array, d: Array) -> Array:
     """The states `q + d`, which stay on their sides of all corners."""
     moved, law = q + d, nodal.smoothness
@@ -429,9 +443,9 @@ _MOST_TURNS = 1e15
 def floquet_multipliers(state: BalanceState) -> FloquetResult:
     """Multipliers, error estimates and verdict of a solved motion, over the motion's own period (`nu` load periods)."""
     check_time()
-    motion = _Motion(Linearised(state))
+    motion = _Linearised(state)
     if not np.isfinite(motion.before).all():
-        return _no_numbers(state, motion.along.size)
+        return _no_numbers(state, motion.size)
     mu, shift, share = motion.multipliers(1.0)
     # there are few: numbers are quicker than arrays
     values, shifts = mu.tolist(), shift.tolist()
@@ -444,7 +458,7 @@ def floquet_multipliers(state: BalanceState) -> FloquetResult:
         mu, shift, share = _beside_fold(motion, moved, shift)
     # where the correction had to be cut, the motion is not near enough to a true one to say much
     cut = 1.0 / share - 1.0 if share > 0.0 else math.inf
-    least = (_PANELS if motion.along.varying else 0.0) + cut
+    least = (_PANELS if motion.varying else 0.0) + cut
     return FloquetResult(mu, shift * (1.0 + cut) + least * largest)
 
 
@@ -458,52 +472,16 @@ def _no_numbers(state: BalanceState, count: int) -> FloquetResult:
     return FloquetResult.inapplicable(count, "monodromy", "The linearised motion is not finite")
 
 
-def _beside_fold(motion: _Motion, moved: float, shift: Array) -> tuple[ComplexArray, Array, float]:
+def _beside_fold(motion: _Linearised, moved: float, shift: Array) -> tuple[ComplexArray, Array, float]:
     """Multipliers, shifts and share where a correction may have no meaning, as it does at a limit point.
 
     moved: shift of the multiplier nearest to +1 by the whole correction.
     """
-    gap = motion.gap()
+    gap = float(np.abs(1.0 - np.linalg.eigvals(motion.before)).min())
     ratio = 2.0 * moved / gap if gap > 0.0 else math.inf
     mu, kept, share = motion.multipliers(1.0 / (1.0 + min(ratio, 1e6) ** 4))
     left_out = moved * min(1.0, 2.0 / math.sqrt(ratio)) if math.isfinite(moved) else math.inf
     return mu, kept + 2.0 * left_out, share
-
-
-class _Motion:
-    """A motion as it stands, and one step of Newton's method from it.
-
-    Attributes
-    ----------
-    before
-        Monodromy matrix along the motion as it stands, (2 n, 2 n).
-    """
-
-    def __init__(self, along: Linearised) -> None:
-        self.along = along
-        self.before, start, self._nodes = along.standing()
-        self._start = start if len(self._nodes) and len(along.active) else None
-
-    def multipliers(self, weight: float) -> tuple[ComplexArray, Array, float]:
-        """Multipliers, how far the correction has moved them, and the share of it that was taken.
-
-        weight: share of its part along the direction of the real multiplier nearest to +1.
-        """
-        along, share, start = self.along, 1.0, self._start
-        change = np.zeros_like(along.path)
-        if start is not None:
-            if weight < 1.0:
-                start = start - (1.0 - weight) * (projector(self.before) @ start)
-            share = response(start, self._nodes, along.active, along.path, _LARGEST, change)
-        after = along.corrected(change)
-        mu, shift = np.empty(along.size, dtype=complex), np.empty(along.size)
-        real, imaginary, left, right, _ = lapack.dgeev(after, 1, 1)
-        multipliers_and_shifts(real, imaginary, left, right, after, self.before, mu, shift)
-        return mu, shift, share
-
-    def gap(self) -> float:
-        """Distance to +1 of the nearest multiplier of the motion as it stands."""
-        return float(np.abs(1.0 - np.linalg.eigvals(self.before)).min())
 
 
 def projector(phi: Array) -> Array:

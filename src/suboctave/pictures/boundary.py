@@ -26,18 +26,7 @@ from suboctave.errors import InputError, suggest
 from suboctave.kinds import KINDS
 from suboctave.options import with_options
 from suboctave.pictures import strokes, style
-from suboctave.pictures.drawing import (
-    Axis,
-    Beads,
-    Drawing,
-    Entry,
-    Frame,
-    Label,
-    Markers,
-    Region,
-    Surface,
-    plain,
-)
+from suboctave.pictures.drawing import Axis, Beads, Drawing, Entry, Frame, Label, Markers, Region, Surface, plain
 from suboctave.pictures.options import Coordinates, SpaceOptions, View
 from suboctave.pictures.paper import figure_of
 from suboctave.pictures.strokes import add_strokes, checked, events_of, line_through, named_axis, seen_as

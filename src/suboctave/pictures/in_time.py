@@ -288,11 +288,7 @@ def plot_separation(separation: xarray.Dataset, *, most: int = 20) -> Layout:
 
 
 @picture((6.4, 4.2), grid=False)
-def plot_lyapunov_map(
-    chart: xarray.Dataset,
-    *,
-    lines: Sequence[tuple[str, np.ndarray, np.ndarray]] = (),
-) -> Layout:
+def plot_lyapunov_map(chart: xarray.Dataset, *, lines: Sequence[tuple[str, np.ndarray, np.ndarray]] = ()) -> Layout:
     """Largest exponents in colour where the motion is chaotic, white where it is not, grey where nothing is known.
 
     `lines`: a name, frequencies and values of the parameter each, drawn over it.
@@ -314,11 +310,7 @@ def plot_lyapunov_map(
 
 
 @picture((5.6, 4.6), legend="below", grid=False)
-def plot_basins(
-    basins: xarray.Dataset,
-    *,
-    points: Sequence[np.ndarray] | None = None,
-) -> Layout:
+def plot_basins(basins: xarray.Dataset, *, points: Sequence[np.ndarray] | None = None) -> Layout:
     """The plane of states, each in the colour of the motion that it tends to.
 
     `points`: of each attractor its stroboscopic points (n, 2) in this plane, which are marked.
@@ -391,10 +383,7 @@ _MARKS = {
 
 @picture((6.4, 4.2), by_kind=True)
 def plot_verified(
-    curve: xarray.Dataset,
-    places: np.ndarray,
-    outcomes: Sequence[str],
-    unconfirmed: np.ndarray,
+    curve: xarray.Dataset, places: np.ndarray, outcomes: Sequence[str], unconfirmed: np.ndarray
 ) -> Layout:
     """The curve of a dataset with a mark at each of `places` (P, 2), by its outcome.
 
