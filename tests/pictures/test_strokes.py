@@ -115,15 +115,6 @@ def test_a_single_point():
     assert described(dataset) == [([1.0], True)]
 
 
-def test_wrong_lengths_are_refused():
-    with pytest.raises(InputError, match="stable: expected 5 values"):
-        curve([1, 0], [])
-    with pytest.raises(InputError, match="after point 9"):
-        curve(None, [EventRow("LP", 9, 1.0, 1.0)])
-    with pytest.raises(InputError, match="free parameter 'q'"):
-        curve_dataset(X, X, parameters={"p": 1.0}, free="q")
-
-
 def test_a_parameter_may_have_any_name():
     dataset = curve_dataset(X, X, parameters={"amplitude": X, "error": 3.0}, free="amplitude")
     assert list(dataset["amplitude"].to_numpy()) == list(X)

@@ -22,7 +22,7 @@ import numpy as np
 
 from suboctave.atomic import replace_file
 from suboctave.errors import InputError, path_of
-from suboctave.store.layout import LAYOUT
+from suboctave.store.layout import LAYOUT, known_layout
 from suboctave.version import __version__
 
 if TYPE_CHECKING:
@@ -32,35 +32,24 @@ if TYPE_CHECKING:
 _AGAIN = "run the study again, or take a copy that is whole"
 
 
-def number(value: Any) -> Any:
-    """An attribute as a file gives it, as Python's own number or text."""
-    return value.item() if isinstance(value, np.generic) else value
-
-
 def write(path: Path, groups: Mapping[str, xarray.Dataset], attributes: Mapping[str, Any]) -> None:
     """The datasets as groups of one file (the name "" is the root), with attributes on the root."""
     import xarray
 
     def make(place: Path) -> None:
-        root = groups.get("", xarray.Dataset())
-        root = root.assign_attrs(attributes)
-        _to_group(root, place, None, "w")
-        for name, dataset in groups.items():
-            if name:
-                _to_group(dataset, place, name, "a")
+        root = groups.get("", xarray.Dataset()).assign_attrs(attributes)
+        for name, dataset in {"": root, **{name: part for name, part in groups.items() if name}}.items():
+            stated = dataset.assign_attrs(layout=LAYOUT, suboctave=__version__)
+            stated = stated.assign_attrs(digest=digest(stated))
+            encoding: dict[Any, Any] = {
+                variable: {"_FillValue": None} | ({"zlib": True, "shuffle": True} if values.size > 256 else {})
+                for variable, values in stated.variables.items()
+                if values.dtype.kind not in "OU"
+            }
+            mode: Any = "a" if name else "w"
+            stated.to_netcdf(place, mode=mode, group=name or None, engine="h5netcdf", encoding=encoding)
 
     replace_file(path, make)
-
-
-def _to_group(dataset: xarray.Dataset, place: Path, group: str | None, mode: Any) -> None:
-    stated = dataset.assign_attrs(layout=LAYOUT, suboctave=__version__)
-    stated = stated.assign_attrs(digest=digest(stated))
-    encoding: dict[Any, Any] = {
-        name: {"_FillValue": None} | ({"zlib": True, "shuffle": True} if variable.size > 256 else {})
-        for name, variable in stated.variables.items()
-        if variable.dtype.kind not in "OU"
-    }
-    stated.to_netcdf(place, mode=mode, group=group, engine="h5netcdf", encoding=encoding)
 
 
 def read(path: str | Path) -> dict[str, xarray.Dataset]:
@@ -88,7 +77,8 @@ def read(path: str | Path) -> dict[str, xarray.Dataset]:
     except Exception as error:  # what a damaged file makes of the HDF5 library is anyone's guess
         raise InputError(f"{source} is damaged or cut short ({_first_line(error)}): {_AGAIN}") from None
     for name, dataset in groups.items():
-        _check(source, name, dataset)
+        _check(f"the part {name!r} of {source}" if name else str(source), dataset)
+        dataset.attrs = {key: _scalar(value) for key, value in dataset.attrs.items()}
     return groups
 
 
@@ -97,16 +87,7 @@ def _read_groups(source: Path) -> dict[str, xarray.Dataset]:
     import xarray
 
     with h5py.File(source, "r") as file:
-        if "layout" not in file.attrs:
-            raise InputError(f"{source} is no results file of suboctave: it has no attribute 'layout'")
-        layout = int(np.ravel(file.attrs["layout"])[0])
-        if layout > LAYOUT:
-            raise InputError(
-                f"{source} has layout {layout}, newer than {LAYOUT}: it was written by suboctave "
-                f"{file.attrs.get('suboctave', '(unknown version)')}; update suboctave to read it"
-            )
-        if layout < 1:
-            raise InputError(f"{source} states the unknown layout {layout}: {_AGAIN}")
+        known_layout(file.attrs, str(source))
         names: list[str] = []
         file.visititems(lambda name, item: names.append(name) if isinstance(item, h5py.Group) else None)
     groups = {}
@@ -116,8 +97,8 @@ def _read_groups(source: Path) -> dict[str, xarray.Dataset]:
     return groups
 
 
-def _check(source: Path, name: str, dataset: xarray.Dataset) -> None:
-    part = f"the part {name!r} of {source}" if name else str(source)
+def _check(part: str, dataset: xarray.Dataset) -> None:
+    """That the content of a part of a file is what was written."""
     stated = dataset.attrs.pop("digest", None)
     if stated is None:
         raise InputError(f"{part} has no digest: it was changed by another program; {_AGAIN}")
@@ -137,7 +118,6 @@ def _first_line(error: Exception) -> str:
 # --------------------------------------------------------------------------------------------------------------- blocks
 def pack(dataset: xarray.Dataset) -> bytes:
     """The dataset's variables and attributes (numbers and texts) as bytes."""
-    head: dict[str, Any] = {"attrs": {str(k): _scalar(dataset.attrs[k]) for k in sorted(dataset.attrs, key=str)}}
     variables: list[dict[str, Any]] = []
     bodies: list[bytes] = []
     for name in sorted(dataset.variables, key=str):
@@ -157,7 +137,8 @@ def pack(dataset: xarray.Dataset) -> bytes:
             entry["dtype"] = plain.dtype.str
             bodies.append(plain.tobytes())
         variables.append(entry)
-    head["variables"] = variables
+    attributes = {str(name): _scalar(dataset.attrs[name]) for name in sorted(dataset.attrs, key=str)}
+    head = {"attrs": attributes, "variables": variables}
     text = json.dumps(head, ensure_ascii=False, separators=(",", ":")).encode("utf-8", "surrogatepass")
     return b"".join([len(text).to_bytes(8, "little"), text, *bodies])
 

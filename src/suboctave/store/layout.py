@@ -72,14 +72,7 @@ def led_by(frame: pandas.DataFrame, leading: Mapping[str, Any]) -> pandas.DataFr
 # --------------------------------------------------------------------------------------------------------------- curves
 LAYOUT = 1  # the number of this layout; it grows when a name or a meaning below changes
 UNKNOWN = -1  # in event_stable_after
-RESERVED = frozenset(
-    {"point", "event", "parameter", "multiplier", "omega", "amplitude", "stable", "harmonics", "error", "residual"}
-    | {"multipliers", "multiplier_errors", "stability_method", "parameters", "coefficient"}
-    # what files add, and their dimensions (`results/files.py`)
-    | {"arclength", "iterations", "coefficients", "record", "unknown", "multipliers_real", "multipliers_imag"}
-)
-RESERVED_PREFIXES = ("event_", "system_array_")
-#: variables on `point` besides omega and the parameters: kind, meaning; of those with two dimensions the second one
+#: variables on `point` besides omega and the parameters: kind, meaning
 _POINTS: dict[str, tuple[type, str]] = {
     "amplitude": (float, "max |x| over one response period"),
     "stable": (bool, "all Floquet multipliers inside the unit circle"),
@@ -90,10 +83,15 @@ _POINTS: dict[str, tuple[type, str]] = {
     "multiplier_errors": (float, "estimated errors of the multipliers"),
     "stability_method": (object, "where the multipliers come from"),
 }
-_TABLES = ("multipliers", "multiplier_errors")
+RESERVED = frozenset(
+    {*_POINTS, "point", "event", "parameter", "multiplier", "omega", "parameters", "coefficient"}
+    # what files add, and their dimensions (`results/files.py`)
+    | {"arclength", "iterations", "coefficients", "record", "unknown", "multipliers_real", "multipliers_imag"}
+)
+RESERVED_PREFIXES = ("event_", "system_array_")
 #: attributes of a curve, with their defaults
-_ATTRIBUTES: dict[str, Any] = {"system": "", "ended": "", "closed": False, "period": 1, "observed_dof": 0, "dofs": 1}
-#: variables on `event`, after the fields of `EventRow`: kind, meaning
+_ATTRIBUTES: dict[str, Any] = {"system": "", "ended": "", "closed": 0, "period": 1, "observed_dof": 0, "dofs": 1}
+#: variables on `event`, the fields of `EventRow` that all curves have: kind, meaning
 _EVENTS: dict[str, tuple[type, str]] = {
     "kind": (object, ""),
     "after": (int, ""),
@@ -117,8 +115,7 @@ _BY_ANOTHER = frozenset({"R1", "R2", "LPPD", "LPNS", "PDNS", "NSNS"})
 class EventRow:
     """One located bifurcation, as a row of the dataset.
 
-    What the fields mean stands above; `stable_after` is None where it is not known, `parameters` holds those that
-    differ from the curve's fixed ones.
+    What the fields mean stands above; `parameters` holds those that differ from the curve's fixed ones.
     """
 
     kind: str
@@ -129,8 +126,8 @@ class EventRow:
     multiplier: complex = complex(np.nan, np.nan)
     multiplier_error: float = np.nan
     stability_method: str = ""
-    criticality: str | None = None
-    stable_after: bool | None = None
+    criticality: str = ""
+    stable_after: int = UNKNOWN
     uncertainty: float = 0.0
     contact: str = ""
     contact_at: float = np.nan
@@ -150,55 +147,25 @@ def curve_dataset(
 ) -> xarray.Dataset:
     """A curve of periodic motions as a labelled dataset; the layout is described at the top of this module.
 
-    Parameters
-    ----------
-    omega, amplitude
-        At the points, (points,): in rad per unit time; max |x| over one response period at the observed degree of
-        freedom, in the system's unit of length.
-    parameters
-        Each a number, or (points,) where it varies along the curve; `free` names the one that the curve was followed
-        in.
-    options
-        Further numbers or texts that say how the curve was computed.
-    given
-        Variables on `point`: `stable`, `harmonics`, `error`, `residual`, `stability_method` (points,); `multipliers`,
-        complex, and their errors `multiplier_errors` (points, m). Attributes: `system`, `ended`, `closed`, `period` (in
-        periods of the load), `observed_dof`, `dofs`.
-
-    Raises
-    ------
-    InputError
-        Where lengths disagree or `free` is not a parameter.
+    `parameters`: each a number, or (points,) where it varies along the curve; `free` names the one that the curve was
+    followed in. `given`: variables on `point`, (points, ...), and attributes; `options`: attributes that say how the
+    curve was computed.
     """
     import xarray
 
-    for name in given:
-        if name not in _POINTS and name not in _ATTRIBUTES:
-            raise TypeError(f"curve_dataset() got an unexpected keyword argument {name!r}")
-    frequency = _points("omega", omega, None)
-    count = frequency.size
-    values = {
-        name: np.full(count, float(np.asarray(value))) if np.ndim(value) == 0 else _points(name, value, count)
-        for name, value in (parameters or {}).items()
+    frequency = np.asarray(omega, dtype=float)
+    values: dict[str, np.ndarray] = {
+        n: np.full(frequency.size, value, dtype=float) for n, value in (parameters or {}).items()
     }
-    if free != "omega" and free not in values:
-        raise InputError(f"the free parameter {free!r} is not a parameter of the curve{suggest(free, values)}")
-    for row in events:
-        if not 0 <= row.after < count:
-            raise InputError(f"event {row.kind} lies after point {row.after} of a curve of {count} points")
-
-    columns = np.array([*values.values()]).reshape(len(values), count)
+    columns = np.array([*values.values()]).reshape(len(values), frequency.size)
     variables: dict[str, Any] = {"parameters": (("point", "parameter"), columns.T)}
+    given["amplitude"] = amplitude
     for name, (kind, meaning) in _POINTS.items():
-        rows = amplitude if name == "amplitude" else given.get(name)
-        if rows is not None:
-            dims = ("point", "multiplier") if name in _TABLES else ("point",)
-            variables[name] = (dims, _points(name, rows, count, kind, len(dims)), {"long_name": meaning})
-    fields = {name: [getattr(row, name) for row in events] for name in _EVENTS}
-    fields["criticality"] = [word or "" for word in fields["criticality"]]
-    fields["stable_after"] = [UNKNOWN if stable is None else int(stable) for stable in fields["stable_after"]]
+        if given.get(name) is not None:
+            rows: np.ndarray = np.asarray(given[name], dtype=kind)
+            variables[name] = (("point", "multiplier")[: rows.ndim], rows, {"long_name": meaning})
     for name, (kind, meaning) in _EVENTS.items():
-        column: np.ndarray = np.array(fields[name], dtype=kind)
+        column: np.ndarray = np.array([getattr(row, name) for row in events], dtype=kind)
         variables[f"event_{name}"] = ("event", column, {"long_name": meaning} if meaning else {})
     there = [[row.parameters.get(name, values[name][row.after]) for name in values] for row in events]
     table = np.array(there, dtype=float).reshape(len(events), len(values))
@@ -212,29 +179,14 @@ def curve_dataset(
         taken = (free,) if free in RESERVED or free.startswith(RESERVED_PREFIXES) else ()
         coords[parameter_column(free, taken)] = ("point", values[free].copy())
     own = {name: given.get(name, default) for name, default in _ATTRIBUTES.items()}
-    attributes = {"layout": LAYOUT, "suboctave": __version__, "free": free, **own, "closed": int(own["closed"])}
-    for name, value in (options or {}).items():
-        if name in attributes:
-            raise InputError(f"option {name!r} would overwrite an attribute of the layout")
-        attributes[name] = value
+    attributes = {"layout": LAYOUT, "suboctave": __version__, "free": free, **own, **(options or {})}
     return xarray.Dataset(variables, coords, attributes)
-
-
-def _points(name: str, values: ArrayLike, count: int | None, kind: type = float, dimensions: int = 1) -> np.ndarray:
-    array: np.ndarray = np.asarray(values, dtype=kind)
-    if dimensions == 2 and (array.ndim != 2 or len(array) != count):
-        raise InputError(f"{name}: expected one row for each of the {count} points, got shape {array.shape}")
-    if dimensions == 1 and (array.ndim != 1 or (count is not None and array.size != count)):
-        wanted = "a one-dimensional array" if count is None else f"{count} values, one for each point"
-        raise InputError(f"{name}: expected {wanted}, got shape {array.shape}")
-    return array
 
 
 # --------------------------------------------------------------------------------------------------------- a branch
 def branch_dataset(branch: Any) -> xarray.Dataset:
     """A computed branch as a labelled dataset; the layout is described at the top of this module."""
-    names = list(branch.system.parameters)
-    rows = _event_rows(branch, np.asarray(branch.arclength))
+    rows = _event_rows(branch)
     dataset = curve_dataset(
         branch.omega,
         branch.amplitude,
@@ -242,12 +194,12 @@ def branch_dataset(branch: Any) -> xarray.Dataset:
         error=branch.truncation,
         residual=[orbit.residual for orbit in branch.orbits],
         stability_method=branch.stability_methods,
-        parameters={name: branch.parameter(name) for name in names},
+        parameters={name: branch.parameter(name) for name in branch.system.parameters},
         free=branch.name,
         events=rows,
         system=branch.system.name,
         ended=branch.ended,
-        closed=branch.closed,
+        closed=int(branch.closed),
         period=branch.orbits[0].basis.nu if len(branch.orbits) else 1,
         observed_dof=branch.observe,
         dofs=branch.system.n,
@@ -272,23 +224,31 @@ def events_met(branch: Any) -> list[Any]:
     return sorted([*branch.bifurcations, *branch.grazings, *branch.events], key=lambda event: event.arclength)
 
 
-def _event_rows(branch: Any, arclength: np.ndarray) -> list[EventRow]:
+def _event_rows(branch: Any) -> list[EventRow]:
     """The branch's bifurcations, grazings and events in the order met, each with its place and the verdict after it."""
     own = {id(event) for event in (*branch.grazings, *branch.events)}  # stability goes on through these
+    arclength = np.asarray(branch.arclength)
+    same = ("kind", "omega", "amplitude", "residual", "stability_method", "uncertainty")
     rows: list[EventRow] = []
     for event in events_met(branch):
         place = int(np.searchsorted(arclength, event.arclength, side="right")) - 1
         after = min(max(place, 0), max(arclength.size - 2, 0))
-        last = rows[-1].stable_after if rows and rows[-1].after == after else None
-        before = bool(branch.stable[after]) if last is None else last
-        same = ("kind", "omega", "amplitude", "residual", "stability_method", "criticality", "uncertainty")
+        before = bool(rows[-1].stable_after if rows and rows[-1].after == after else branch.stable[after])
         given: dict[str, Any] = {name: getattr(event, name) for name in same}
         if event.contact is not None:
             given |= {"contact": str(event.contact), "contact_at": event.contact.parameter}
-        given |= {"multiplier": event.critical_multiplier(), "multiplier_error": event.critical_error}
-        given |= {"stable_after": _stable_after(branch, event, after, before, id(event) in own)}
-        extreme = f"{event.extreme} of {event.parameter_name}" if getattr(event, "extreme", "") else ""
-        rows.append(EventRow(after=after, parameters=dict(event.parameters), extreme=extreme, **given))
+        if getattr(event, "extreme", ""):
+            given["extreme"] = f"{event.extreme} of {event.parameter_name}"
+        row = EventRow(
+            after=after,
+            parameters=dict(event.parameters),
+            multiplier=event.critical_multiplier(),
+            multiplier_error=event.critical_error,
+            criticality=event.criticality or "",
+            stable_after=_stable_after(branch, event, after, before, id(event) in own),
+            **given,
+        )
+        rows.append(row)
     return rows
 
 
@@ -310,38 +270,38 @@ def _stable_after(branch: Any, event: Any, after: int, before: bool, own: bool) 
 # ----------------------------------------------------------------------------------------------------- quantities
 @dataclass(frozen=True)
 class Quantity:
-    """What is read off motions: its meaning and unit, what an axis says, the number that it needs, whether of a DOF.
+    """What is read off motions: its meaning and unit, and what an axis says.
 
-    `axis`, with {x} the displacement, {k} the harmonic, {e} the element.
+    `axis` names what it needs: {x} the displacement of a DOF, {k} the number of a harmonic, {e} that of an element.
     """
 
     meaning: str
     unit: str
     axis: str
-    numbered: str = ""
-    of_dof: bool = False
+
+    @property
+    def of_dof(self) -> bool:
+        """Whether it is one of a degree of freedom."""
+        return "{x}" in self.axis
+
+    @property
+    def numbered(self) -> str:
+        """What it needs the number of, "harmonic" or "element"; else empty."""
+        return "harmonic" if "{k}" in self.axis else "element" if "{e}" in self.axis else ""
 
 
 QUANTITIES: Mapping[str, Quantity] = {
-    "amplitude": Quantity("max |x| over a period", "length", r"amplitude $\max\,|{x}|$", of_dof=True),
-    "rms": Quantity("root mean square of x", "length", r"RMS of ${x}$", of_dof=True),
-    "velocity": Quantity("max |dx/dt| over a period", "length / time", r"velocity $\max\,|\dot{{{x}}}|$", of_dof=True),
-    "velocity_rms": Quantity("root mean square of dx/dt", "length / time", r"RMS of $\dot{{{x}}}$", of_dof=True),
-    "acceleration": Quantity(
-        "max |d2x/dt2| over a period", "length / time^2", r"acceleration $\max\,|\ddot{{{x}}}|$", of_dof=True
-    ),
-    "acceleration_rms": Quantity(
-        "root mean square of d2x/dt2", "length / time^2", r"RMS of $\ddot{{{x}}}$", of_dof=True
-    ),
-    "harmonic": Quantity("amplitude of x", "length", r"harmonic {k} of ${x}$", "harmonic", of_dof=True),
-    "phase": Quantity(
-        "phase of x, negative where it lags", "rad", r"phase of harmonic {k} of ${x}$", "harmonic", of_dof=True
-    ),
-    "peak_force": Quantity("largest |force| over a period", "force", "peak force, element {e}", "element"),
-    "contact_share": Quantity(
-        "share of the period in contact", "1", "share of period in contact, element {e}", "element"
-    ),
-    "impacts": Quantity("contacts begun per period of the motion", "1", "impacts per period, element {e}", "element"),
+    "amplitude": Quantity("max |x| over a period", "length", r"amplitude $\max\,|{x}|$"),
+    "rms": Quantity("root mean square of x", "length", r"RMS of ${x}$"),
+    "velocity": Quantity("max |dx/dt| over a period", "length / time", r"velocity $\max\,|\dot{{{x}}}|$"),
+    "velocity_rms": Quantity("root mean square of dx/dt", "length / time", r"RMS of $\dot{{{x}}}$"),
+    "acceleration": Quantity("max |d2x/dt2| over a period", "length / time^2", r"acceleration $\max\,|\ddot{{{x}}}|$"),
+    "acceleration_rms": Quantity("root mean square of d2x/dt2", "length / time^2", r"RMS of $\ddot{{{x}}}$"),
+    "harmonic": Quantity("amplitude of x", "length", r"harmonic {k} of ${x}$"),
+    "phase": Quantity("phase of x, negative where it lags", "rad", r"phase of harmonic {k} of ${x}$"),
+    "peak_force": Quantity("largest |force| over a period", "force", "peak force, element {e}"),
+    "contact_share": Quantity("share of the period in contact", "1", "share of period in contact, element {e}"),
+    "impacts": Quantity("contacts begun per period of the motion", "1", "impacts per period, element {e}"),
     "transmitted_force": Quantity("largest |force| on the ground over a period", "force", "peak force on the ground"),
     "transmissibility": Quantity("force on the ground over force applied, first harmonics", "1", "transmissibility"),
 }
@@ -386,14 +346,20 @@ def coordinate(dataset: xarray.Dataset, name: str) -> tuple[np.ndarray, np.ndarr
 
 
 def check_layout(dataset: xarray.Dataset) -> None:
-    """Raises InputError when the dataset is not one that `curve_dataset` of this version lays out."""
-    layout = dataset.attrs.get("layout")
-    if layout is None:
-        raise InputError("this dataset was not laid out by suboctave: it has no attribute 'layout'")
-    if int(layout) > LAYOUT:
+    """Raises InputError when the dataset is not one that this version lays out."""
+    known_layout(dataset.attrs, "this dataset")
+
+
+def known_layout(attributes: Mapping[str, Any], what: str) -> None:
+    """Raises InputError where the attributes of `what` state no layout, or one that this version does not know."""
+    if "layout" not in attributes:
+        raise InputError(f"{what} was not laid out by suboctave: it has no attribute 'layout'")
+    layout = int(np.ravel(attributes["layout"])[0])
+    if not 1 <= layout <= LAYOUT:
+        which = f"newer than {LAYOUT}" if layout > LAYOUT else "which no version has written"
         raise InputError(
-            f"this dataset has layout {layout}, newer than {LAYOUT}: it was written by suboctave "
-            f"{dataset.attrs.get('suboctave', '(unknown version)')}; update suboctave"
+            f"{what} has layout {layout}, {which}: it was written by suboctave "
+            f"{attributes.get('suboctave', '(unknown version)')}; update suboctave"
         )
 
 

@@ -30,7 +30,7 @@ from suboctave.harmonic.orbit import PeriodicOrbit, force_along
 from suboctave.model.elements.coupled import reads
 from suboctave.model.elements.smoothness import levels
 from suboctave.model.inputs import check_element
-from suboctave.store.layout import LAYOUT
+from suboctave.store.layout import LAYOUT, check_layout
 from suboctave.version import __version__
 
 if TYPE_CHECKING:
@@ -108,8 +108,7 @@ def _laid_out(
 def _checked(dataset: xarray.Dataset, dof: int | None, elements: tuple[int, ...]) -> xarray.Dataset:
     if dataset.attrs.get("contents") != _CONTENTS:
         raise InputError("this dataset is no motion: give the branch with points=, or one of its orbits")
-    if int(dataset.attrs["layout"]) > LAYOUT:
-        raise InputError(f"this dataset has layout {dataset.attrs['layout']}, newer than {LAYOUT}: update suboctave")
+    check_layout(dataset)
     there = int(dataset.attrs["dof"])
     if dof is not None and dof != there:
         raise InputError(f"this dataset holds the motion of DOF {there}, not of DOF {dof}")

@@ -33,17 +33,9 @@ Datasets = Mapping[str, "xarray.Dataset"]
 class Codec:
     """How the results of one class are written and read.
 
-    Parameters
-    ----------
-    contents
-        What files call them.
-    made
-        The class; what derives from it is written in the same way unless it has a codec of its own.
-    write
-        From a result to its datasets; the one named "" comes first.
-    read
-        From datasets, whether the modules of a user's own laws may be imported, and the linear part of the
-        computation, to the result.
+    `contents`: what files call them; `made`: the class, and what derives from it without a codec of its own; `write`:
+    from a result to its datasets, the one named "" first; `read`: from datasets, whether the modules of a user's own
+    laws may be imported, and the linear part of the computation, to the result.
     """
 
     contents: str
@@ -52,17 +44,13 @@ class Codec:
     read: Callable[[Datasets, bool, LinearPart | None], Any]
 
 
-_codecs: dict[str, Codec] = {}
+#: by what files call their contents
+CODECS: dict[str, Codec] = {}
 
 
 def register(codec: Codec) -> None:
     """Make a codec known."""
-    _codecs[codec.contents] = codec
-
-
-def contents() -> tuple[str, ...]:
-    """What files can hold, by name."""
-    return tuple(_codecs)
+    CODECS[codec.contents] = codec
 
 
 def to_datasets(item: Any, details: Mapping[str, Any] | None = None) -> dict[str, xarray.Dataset]:
@@ -70,7 +58,7 @@ def to_datasets(item: Any, details: Mapping[str, Any] | None = None) -> dict[str
 
     Raises InputError where its class has no codec.
     """
-    by_class = {codec.made: codec for codec in _codecs.values()}
+    by_class = {codec.made: codec for codec in CODECS.values()}
     codec = next((by_class[cls] for cls in type(item).__mro__ if cls in by_class), None)
     if codec is None:
         raise InputError(f"{type(item).__name__} cannot be written to a file")
@@ -82,8 +70,8 @@ def from_datasets(
     groups: Datasets, allow_code: bool = False, linear: LinearPart | None = None
 ) -> tuple[Any, dict[str, Any]]:
     """The result that `to_datasets` wrote, and the attributes of the dataset named ""; InputError where it is none."""
-    details = {str(name): files.number(value) for name, value in groups[""].attrs.items()}
-    codec = _codecs.get(str(details.get("contents")))
+    details = {str(name): value for name, value in groups[""].attrs.items()}
+    codec = CODECS.get(str(details.get("contents")))
     if codec is None:
         raise InputError(f"a part of the file holds {details.get('contents')!r}, which this version does not know")
     try:
@@ -97,12 +85,10 @@ def from_datasets(
 
 def parts_of(groups: Datasets, names: Iterable[str], whole: str) -> dict[str, xarray.Dataset]:
     """The datasets of these names; InputError where one is missing, `whole` being what it is a part of."""
-    parts = {}
-    for name in names:
-        if name not in groups:
-            raise InputError(f"{name} of the {whole} is missing")
-        parts[name] = groups[name]
-    return parts
+    wanted = list(names)
+    if missing := [name for name in wanted if name not in groups]:
+        raise InputError(f"{missing[0]} of the {whole} is missing")
+    return {name: groups[name] for name in wanted}
 
 
 class Stored:

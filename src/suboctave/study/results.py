@@ -128,7 +128,7 @@ def load(path: str | Path, *, allow_code: bool = False, linear: LinearPart | Non
     root = groups[""]
     read: dict[str, tuple[Any, dict[str, Any]]] = {}
     try:
-        if root.attrs.get("contents") in registry.contents():
+        if root.attrs.get("contents") in registry.CODECS:
             item: Saved = registry.from_datasets(groups, allow_code, linear)[0]
             return item
         for name, parts in _by_analysis(groups).items():
@@ -138,7 +138,7 @@ def load(path: str | Path, *, allow_code: bool = False, linear: LinearPart | Non
         raise InputError(f"{path}: {error}") from None
     order = str(root.attrs.get("analyses", "")).splitlines()
     names = sorted(read, key=lambda name: order.index(name) if name in order else len(order))
-    attributes = {str(name): files.number(value) for name, value in root.attrs.items()}
+    attributes = {str(name): value for name, value in root.attrs.items()}
     return Results({n: read[n][0] for n in names}, attributes, {n: read[n][1] for n in names})
 
 
