@@ -65,7 +65,8 @@ def with_options(declared: Any) -> Callable[[Callable[Arguments, Result]], Calla
         described: Any = checked
         described.__signature__ = inspect.Signature([*own, *more], return_annotation=returns)
         if verb.__doc__ is not None:
-            listed = "".join(f"{p.name}\n{_indented(types[p.name][1])}" for p in more)
+            fill = textwrap.TextWrapper(108, initial_indent="    ", subsequent_indent="    ").fill
+            listed = "".join(f"{p.name}\n{fill(types[p.name][1])}\n" for p in more)
             section = f"Other Parameters\n----------------\n{listed}"
             if "Raises\n" not in verb.__doc__:
                 section += "\nRaises\n------\nInputError\n    Wrong input, before any work.\n"
@@ -79,7 +80,3 @@ def with_options(declared: Any) -> Callable[[Callable[Arguments, Result]], Calla
 def _short(kind: Any) -> str:
     """A type by the names of its classes alone."""
     return re.sub(r"\b(?:\w+\.)+", "", inspect.formatannotation(kind))
-
-
-def _indented(meaning: str) -> str:
-    return textwrap.fill(meaning, 108, initial_indent="    ", subsequent_indent="    ") + "\n"

@@ -36,12 +36,10 @@ class CurveProgress:
         self._covered = low, high = min(low, value), max(high, value)
         self._now = points, bifurcations
         share = min(1.0, (high - low) / (self.bounds[1] - self.bounds[0]))
-        self.report(share, f"{where}, {self._counted(harmonics)}" if points else where)
-
-    def _counted(self, harmonics: int) -> str:
-        numbers = (self._before[0] + self._now[0], self._before[1] + self._now[1], harmonics)
+        numbers = (self._before[0] + points, self._before[1] + bifurcations, harmonics)
         names = ("point", self.located, "harmonic")
-        return ", ".join(f"{n} {name}{'' if n == 1 else 's'}" for n, name in zip(numbers, names, strict=True))
+        counted = [f"{n} {name}{'' if n == 1 else 's'}" for n, name in zip(numbers, names, strict=True)]
+        self.report(share, ", ".join([where, *counted]) if points else where)
 
 
 @contextmanager

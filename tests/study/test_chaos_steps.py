@@ -9,7 +9,7 @@ import xarray as xr
 import suboctave as so
 from suboctave.store.journal import Journal
 from suboctave.study.file import read_study
-from suboctave.study.runner import finished, keep, recovered, run_study
+from suboctave.study.runner import Noting, recovered, run_study
 
 STUDY = """
 title = "basins"
@@ -72,11 +72,11 @@ def test_files_and_journals_hold_all_of_it(ran, tmp_path):
     journal = Journal.create(tmp_path / "a.journal")
     for step in study.steps:
         table = results[step.name]
-        keep(journal, step.name, step.name, table, 1.0)
+        Noting(journal, step.name, step.name).finish(table, 1.0)
         if step.name == "response":
             continue
         (first,) = (one.result for one in outcome.finished if one.step.name == step.name)
-        again, _ = finished(journal.records, step.name, False)
+        again, _ = Noting(journal, step.name, step.name).finished()
         for other in (table, again):
             xr.testing.assert_identical(first.result.to_xarray(), other.result.to_xarray())
     assert [item.branches for item in recovered(tmp_path / "a.journal")] == [None] * 4

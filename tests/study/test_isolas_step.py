@@ -9,9 +9,9 @@ import pandas as pd
 import pytest
 
 import suboctave as so
-from suboctave.store.journal import Journal, read_journal
+from suboctave.store.journal import Journal
 from suboctave.study.file import read_study
-from suboctave.study.runner import JOURNAL, finished, keep, recovered, run_study
+from suboctave.study.runner import JOURNAL, Noting, recovered, run_study
 from suboctave.study.steps.maps import FindIsolas
 
 SYSTEM = """
@@ -142,11 +142,12 @@ def test_the_terminal(ran, suboctave):
 
 def test_a_finished_search_is_kept_by_the_journal(ran, tmp_path):
     result = ran[0].finished[0].result
-    with_journal = Journal.create(tmp_path / "journal")
-    keep(with_journal, "isolas", "key", result, 1.0)
-    with_journal.close()
-    records = read_journal(tmp_path / "journal")
-    again, said = finished(records, "key", False)
+    journal = Journal.create(tmp_path / "journal")
+    Noting(journal, "isolas", "key").finish(result, 1.0)
+    journal.close()
+    journal = Journal.reopen(tmp_path / "journal")
+    again, said = Noting(journal, "isolas", "key").finished()
+    journal.close()
     assert repr(again) == repr(result)
     assert said["seconds"] == 1.0
     assert np.array_equal(again[0].known[4.0].omega, result[0].known[4.0].omega)
@@ -161,7 +162,7 @@ def test_resume_does_not_search_again(study_file, monkeypatch):
     journal = folder / JOURNAL
     # as if it had been killed before the results were written
     held = Journal.create(journal)
-    keep(held, "isolas", study.keys[study.steps[0].name], first.finished[0].result, 1.0)
+    Noting(held, "isolas", study.keys[study.steps[0].name]).finish(first.finished[0].result, 1.0)
     held.close()
     (folder / "results.nc").unlink()
     monkeypatch.setattr(FindIsolas, "run", None)

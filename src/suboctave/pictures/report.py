@@ -158,7 +158,7 @@ def _datasets(name: str, item: Any) -> dict[str, xarray.Dataset]:
                 f"{name}: expected a dataset of a curve, got {type(dataset).__name__}; a branch has to_xarray()"
             )
         if not is_isolas(dataset) and ("row" not in dataset.sizes or "point" in dataset.sizes):
-            check_layout(dataset)
+            check_layout(dataset.attrs)
     return {str(label): dataset for label, dataset in every.items()}
 
 

@@ -241,7 +241,7 @@ def checked(curves: Sequence[Any]) -> list[xarray.Dataset]:
     for dataset in curves:
         if not isinstance(dataset, xarray.Dataset):
             raise InputError(f"expected a dataset of a curve, got {type(dataset).__name__}; a branch has to_xarray()")
-        check_layout(dataset)
+        check_layout(dataset.attrs)
         if "point" not in dataset.sizes:
             raise InputError(
                 "this dataset is no curve; one of a motion is drawn by plot_phase, plot_spectrum, plot_history"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from functools import cached_property
 from operator import attrgetter
 from pathlib import Path
@@ -51,6 +51,15 @@ class CurveTables(Stored, ABC):
         if what not in frames:
             raise InputError(f"to_csv writes points or bifurcations, not {what!r}{suggest(str(what), frames)}")
         return write_csv(frames[what](), path, overwrite)
+
+    def plot(self, path: Any = None, **options: Any) -> Any:
+        """Draw it: stable parts solid, unstable dashed, bifurcations marked, periods of a diagram in their own colours.
+
+        Saved if a path is given; options are those of `suboctave.plot`.
+        """
+        from suboctave.pictures import plot
+
+        return plot(self, path, **options)
 
 
 def _over_points(path: str, meaning: str) -> Any:
@@ -269,15 +278,6 @@ class Branch(CurveTables, BranchReadings):
             rows.append({names[n]: value for n, value in item.parameters.items() if n in names} | row)
         return pd.DataFrame(rows, columns=[*own[:2], *names.values(), *own[2:]])
 
-    def plot(self, path: Any = None, **options: Any) -> Any:
-        """Draw the branch, stable parts solid, unstable dashed, bifurcations marked; saved if a path is given.
-
-        Options are those of `suboctave.plot`.
-        """
-        from suboctave.pictures import plot
-
-        return plot(self, path, **options)
-
     def sweep_path(self, direction: str = "up") -> SweepPath:
         """The path that a slow sweep of the free parameter "up" or "down" would follow, with its jumps."""
         from suboctave.results.sweep import sweep_path
@@ -290,15 +290,18 @@ class Branch(CurveTables, BranchReadings):
 
         return hysteresis(self.to_xarray())
 
-    def __repr__(self) -> str:
+    @property
+    def _head(self) -> str:
+        """What it is, in a line."""
         values = self.parameter(self.name)
         span = f"{self.name} from {values[0]:.6g} to {values[-1]:.6g}" if len(self) else "empty"
         kind = "Branch" if self.nu == 1 else f"Branch of {period_name(self.nu)} motions"
         leaves = "" if self.departs is None else f"leaves {self.departs}; "
-        text = f"{kind}: {len(self)} points ({self.verdicts}), {span}; {leaves}{self.ended}."
-        for warning in self.warnings:
-            text += f"\n  note: {warning}"
-        return text + "\n" + repr(self.bifurcations)
+        return f"{kind}: {len(self)} points ({self.verdicts}), {span}; {leaves}{self.ended}."
+
+    def __repr__(self) -> str:
+        notes = (f"  note: {warning}" for warning in self.warnings)
+        return "\n".join([self._head, *notes, repr(self.bifurcations)])
 
 
 # ----------------------------------------------------------------------------------------------- curves of bifurcations
@@ -392,31 +395,8 @@ class TrackedBranch(Branch):
         own = super()._columns(readings) | {"coefficient": self.coefficient}
         return own | {"kappa": self.kappa} if self.kind == "NS" else own
 
-    def __repr__(self) -> str:
+    @property
+    def _head(self) -> str:
         ends = [", ".join(f"{n}={self.parameter(n)[i]:.6g}" for n in self.names) for i in (0, -1)]
         what = f"{self.kind} curve, extrema of {self.turning}" if self.turning else f"{self.kind} curve"
-        text = f"{what}: {len(self)} points from {ends[0]} to {ends[1]}; {self.ended}."
-        for warning in self.warnings:
-            text += f"\n  note: {warning}"
-        return text + "\n" + repr(self.bifurcations)
-
-
-def tracked_record(branch: TrackedBranch) -> dict[str, Any]:
-    """What a file holds of a tracked curve besides what it holds of any branch."""
-    return {
-        "kind": branch.kind,
-        "names": branch.names,
-        "turning": branch.turning,
-        "extra": [p.extra for p in branch.tracked],
-        "coefficient": [p.coefficient for p in branch.tracked],
-        "nature": [(p.extreme, p.isola) for p in branch.tracked],
-    }
-
-
-def tracked_points(points: Sequence[BranchPoint], record: Mapping[str, Any]) -> list[Any]:
-    """Points that were read, as those of a tracked curve."""
-    natures = record.get("nature") or [("", "")] * len(points)
-    return [
-        TrackedPoint(p.orbit, p.floquet, p.arclength, p.iterations, None, extra, coefficient, *nature)
-        for p, extra, coefficient, nature in zip(points, record["extra"], record["coefficient"], natures, strict=True)
-    ]
+        return f"{what}: {len(self)} points from {ends[0]} to {ends[1]}; {self.ended}."

@@ -6,7 +6,7 @@ import textwrap
 from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -137,9 +137,10 @@ class BifurcationDiagram(CurveTables):
             matching = [node for node in nodes if node.label.startswith(which)]
             if len(matching) == 1:
                 return matching[0]
-            labels = [node.label for node in nodes]
             if not matching:
-                raise InputError(f"no branch of the diagram has a label that begins with {which!r}{_listed(labels)}")
+                listed = "; ".join(f"{node.number}: {node.label}" for node in nodes[:12])
+                more = "; ..." if len(nodes) > 12 else ""
+                raise InputError(f"no branch of the diagram has a label that begins with {which!r} ({listed}{more})")
             several = "; ".join(f"{node.number}: {node.label}" for node in matching)
             raise InputError(f"{len(matching)} branches have a label that begins with {which!r}: {several}")
         if isinstance(which, bool) or not isinstance(which, int | np.integer):
@@ -219,12 +220,6 @@ class BifurcationDiagram(CurveTables):
             for node, names in zip(nodes, chosen, strict=True)
         }
 
-    def plot(self, path: Any = None, **options: Any) -> Any:
-        """Draw all branches, periods in their own colours; options are those of `suboctave.plot`."""
-        from suboctave.pictures import plot
-
-        return plot(self, path, **options)
-
     def __repr__(self) -> str:
         return tree_text(self)
 
@@ -235,11 +230,6 @@ def _named(node: DiagramBranch, several: bool) -> str:
     if node.origin is not None:
         return f"from {node.origin.kind} {node.origin.parameter(name):.4g}"
     return f"response from {name} = {float(node.branch.parameter(name)[0]):.4g}" if several else "response"
-
-
-def _listed(labels: list[str]) -> str:
-    shown = "; ".join(f"{number}: {label}" for number, label in enumerate(labels[:12]))
-    return f" ({shown}{'; ...' if len(labels) > 12 else ''})"
 
 
 def tree_text(diagram: BifurcationDiagram, width: int = WIDTH, head: bool = True) -> str:

@@ -1,20 +1,14 @@
 """Branches and diagrams as datasets that hold all of them, and back: what `save` and the journal of a study keep.
 
 Of a branch: the dataset of `Branch.to_xarray()` (`suboctave.store.layout`) with complex numbers as pairs of variables
-`..._real`, `..._imag`, and besides on `point`: `coefficients` (point x coefficient x unknown, padded with zeros),
-`arclength`, `iterations`, `multiplier_errors`; on `event` the same under `event_...` and the null vectors. What is
-neither a number per point nor per event is JSON in the variable `record`. docs/results.md describes it for readers
-without this package.
-
-Of a diagram: a head with one entry for each branch on the dimension `branch`, by number: `label`, `period`, `depth`,
-`parent` (the number of the branch that it leaves, -1 for the response) and `origin` (the index of the bifurcation that
-it leaves at on the dimension `event` of its parent, -1 for a response; that from the other end has the first one for
-its parent); and the branches. Bifurcations that were left out or where nothing could be followed are JSON in `record`,
-by branch and index of the event.
+`..._real`, `..._imag`, and besides the motions as `coefficients`, padded with zeros, on `point` and on `event`. What is
+neither a number per point nor per event is JSON in the variable `record`. Of a diagram: a head with one entry for each
+branch, by number, and the branches. docs/results.md describes both for readers without this package.
 """
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
@@ -28,7 +22,7 @@ from suboctave.bifurcation.normal_form import NormalForm
 from suboctave.continuation.ending import Ending, read_endings
 from suboctave.curves.audit import Audit, Unsettled
 from suboctave.curves.junction import Junction
-from suboctave.curves.points import BranchPoint
+from suboctave.curves.points import BranchPoint, TrackedPoint
 from suboctave.errors import InputError
 from suboctave.floquet.result import FloquetResult
 from suboctave.harmonic.basis import HarmonicBasis
@@ -37,11 +31,11 @@ from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.truncation import AdaptiveHarmonics
 from suboctave.interruption import Interruption
-from suboctave.model.system import System, describe
-from suboctave.results.branch import Branch, TrackedBranch, tracked_points, tracked_record
+from suboctave.model.system import System, build, describe
+from suboctave.results.branch import Branch, TrackedBranch
 from suboctave.results.diagram import BifurcationDiagram, DiagramBranch
 from suboctave.store.layout import branch_dataset, events_met
-from suboctave.store.plain import Prefixed, Recorded, from_json, padded, recorded
+from suboctave.store.plain import array_of, from_json, padded, recorded, system_arrays
 from suboctave.store.registry import Codec, parts_of, register
 
 if TYPE_CHECKING:
@@ -74,7 +68,13 @@ def branch_to_dataset(branch: Branch) -> xarray.Dataset:
         "seconds": float(branch.seconds),
         "system": writer.system(branch.system),
         "tables": writer.tables,
-        "tracked": tracked_record(branch) if isinstance(branch, TrackedBranch) else None,
+        "tracked": None
+        if not isinstance(branch, TrackedBranch)
+        else {
+            **{name: getattr(branch, name) for name in ("kind", "names", "turning")},
+            **{name: [getattr(p, name) for p in branch.tracked] for name in ("extra", "coefficient")},
+            "nature": [(p.extreme, p.isola) for p in branch.tracked],
+        },
     }
     iterations = np.array([p.iterations for p in branch.points], dtype=int)
     verdicts = [e.floquet for e in events]
@@ -142,7 +142,7 @@ class _Writer:
 
     def system(self, system: System) -> int:
         if id(system) not in self._numbers:
-            self._numbers[id(system)] = self._listed("systems", describe(system, Prefixed(self.arrays))), system
+            self._numbers[id(system)] = self._listed("systems", describe(system, self.arrays)), system
         return self._numbers[id(system)][0]
 
     def _discretisation(self, balance: HarmonicBalance) -> int:
@@ -184,11 +184,13 @@ class _Writer:
         }
 
 
-class _Reader(Recorded):
+class _Reader:
     def __init__(self, dataset: xarray.Dataset, allow_code: bool, linear: LinearPart | None) -> None:
-        super().__init__(dataset, allow_code, _CLASSES)
+        self.array = functools.cache(functools.partial(array_of, dataset))
+        self.record: dict[str, Any] = from_json(str(dataset["record"].item()), _CLASSES)
         self.tables = self.record["tables"]
-        self.systems = [self.system(text) for text in self.tables["systems"]]
+        arrays = system_arrays(dataset)
+        self.systems = [build(described, arrays, allow_code) for described in self.tables["systems"]]
         self.balances = [self._balance(d, linear) for d in self.tables["discretisations"]]
 
     def _balance(self, stated: Mapping[str, Any], linear: LinearPart | None) -> HarmonicBalance:
@@ -206,8 +208,10 @@ class _Reader(Recorded):
         """A motion with its verdict; `numbers`: omega, values of the parameters, residual, what was neglected of it."""
         which, rule, count, verdict = stored
         balance = self.balances[which]
-        x = self[f"{prefix}coefficients"][i, : balance.basis.size, : balance.size].copy()
-        multipliers, errors = (self[f"{prefix}{n}"][i, :count].copy() for n in ("multipliers", "multiplier_errors"))
+        x = self.array(f"{prefix}coefficients")[i, : balance.basis.size, : balance.size].copy()
+        multipliers, errors = (
+            self.array(f"{prefix}{n}")[i, :count].copy() for n in ("multipliers", "multiplier_errors")
+        )
         omega, values, residual, truncation = numbers
         adaptive = None if rule < 0 else self.tables["rules"][rule]
         orbit = PeriodicOrbit(balance, x, omega, values, residual, truncation, adaptive)
@@ -216,39 +220,41 @@ class _Reader(Recorded):
     def branch(self) -> Branch:
         record = self.record
         points, events = self._points(), self._events()
-        lists: tuple[dict[int, Bifurcation], dict[int, Bifurcation]] = ({}, {})
-        for (place, index), event in zip(record["event_list"], events, strict=True):
-            lists[place][index] = event
-        bifurcations, own = ([items[i] for i in range(len(items))] for items in lists)
+        listed = sorted(zip(record["event_list"], events, strict=True), key=lambda pair: pair[0])
+        bifurcations, own = ([event for (which, _), event in listed if which == place] for place in (0, 1))
         given: dict[str, Any] = {name: record.get(name) for name in _OWN}
         # older files hold the sentence alone
         given["endings"] = given["endings"] or read_endings(record["ended"])
         given |= {"system": self.systems[record["system"]], "points": points}
         given |= {"bifurcations": bifurcations, "events": own}
-        tracked = record.get("tracked")
-        branch = (
-            TrackedBranch(tracked["kind"], tracked["names"], turning=tracked.get("turning", ""), **given)
-            if tracked
-            else Branch(**given)
-        )
+        if tracked := record.get("tracked"):
+            kind, names, turning = tracked["kind"], tracked["names"], tracked.get("turning", "")
+            branch: Branch = TrackedBranch(kind, names, turning=turning, **given)
+        else:
+            branch = Branch(**given)
         branch.seconds = record["seconds"]
         return branch
 
     def _points(self) -> list[BranchPoint]:
-        names = [str(name) for name in self["parameter"]]
-        values = [dict(zip(names, row, strict=True)) for row in self["parameters"].tolist()]
+        names = [str(name) for name in self.array("parameter")]
+        values = [dict(zip(names, row, strict=True)) for row in self.array("parameters").tolist()]
         omega, residual, error, arclength, iterations = (
-            self[name].tolist() for name in ("omega", "residual", "error", "arclength", "iterations")
+            self.array(name).tolist() for name in ("omega", "residual", "error", "arclength", "iterations")
         )
+        tracked = self.record.get("tracked")
         points = []
         for i, stored in enumerate(self.record["points"]):
-            motion = self.motion("", i, stored, omega[i], values[i], residual[i], error[i])
-            points.append(BranchPoint(*motion, arclength[i], iterations[i]))
-        tracked = self.record.get("tracked")
-        return tracked_points(points, tracked) if tracked else points
+            orbit, floquet = self.motion("", i, stored, omega[i], values[i], residual[i], error[i])
+            point = BranchPoint(orbit, floquet, arclength[i], iterations[i])
+            if tracked:
+                nature = tracked["nature"][i] if tracked.get("nature") else ("", "")
+                more = tracked["extra"][i], tracked["coefficient"][i], *nature
+                point = TrackedPoint(orbit, floquet, arclength[i], iterations[i], None, *more)
+            points.append(point)
+        return points
 
     def _events(self) -> list[Bifurcation]:
-        right, left = self["event_null_right"], self["event_null_left"]
+        right, left = self.array("event_null_right"), self.array("event_null_left")
         events = []
         for i, stored in enumerate(self.record["events"]):
             numbers = stored["omega"], stored["values"], stored["residual"], stored["truncation"]

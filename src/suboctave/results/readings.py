@@ -45,6 +45,16 @@ if TYPE_CHECKING:
     import xarray
 
 
+def _of_a_dof(what: str, meaning: str) -> Callable[..., Array]:
+    """A method that reads something off one DOF."""
+
+    def read(self: BranchReadings, dof: int | None = None) -> Array:
+        return self._of(what, dof)
+
+    read.__name__, read.__doc__ = what, meaning
+    return read
+
+
 class BranchReadings:
     """What is read off a branch, each an array (len,) over its points. DOFs default to the observed one."""
 
@@ -61,25 +71,11 @@ class BranchReadings:
     def _of(self, what: str, dof: int | None = None, number: float | None = None) -> Array:
         return Reading(what, dof, number).of(self.orbits, self.observe)
 
-    def rms(self, dof: int | None = None) -> Array:
-        """Root mean square of the displacement over a period, its mean included."""
-        return self._of("rms", dof)
-
-    def velocity(self, dof: int | None = None) -> Array:
-        """Largest |dx/dt| over a period."""
-        return self._of("velocity", dof)
-
-    def velocity_rms(self, dof: int | None = None) -> Array:
-        """Root mean square of the velocity."""
-        return self._of("velocity_rms", dof)
-
-    def acceleration(self, dof: int | None = None) -> Array:
-        """Largest acceleration, in modulus, over a period."""
-        return self._of("acceleration", dof)
-
-    def acceleration_rms(self, dof: int | None = None) -> Array:
-        """Root mean square of the acceleration."""
-        return self._of("acceleration_rms", dof)
+    rms = _of_a_dof("rms", "Root mean square of the displacement over a period, its mean included.")
+    velocity = _of_a_dof("velocity", "Largest |dx/dt| over a period.")
+    velocity_rms = _of_a_dof("velocity_rms", "Root mean square of the velocity.")
+    acceleration = _of_a_dof("acceleration", "Largest acceleration, in modulus, over a period.")
+    acceleration_rms = _of_a_dof("acceleration_rms", "Root mean square of the acceleration.")
 
     def phase(self, k: float = 1, dof: int | None = None) -> Array:
         """Phase of the component at `k omega` in radians, continuous along the branch from a value in (-pi, pi].

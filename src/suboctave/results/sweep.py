@@ -99,7 +99,7 @@ def sweep_path(dataset: xarray.Dataset, direction: str = "up") -> SweepPath:
 
     Raises InputError for another direction, or a branch without verdicts on stability.
     """
-    check_layout(dataset)
+    check_layout(dataset.attrs)
     if not isinstance(direction, str) or direction not in _DIRECTIONS:
         raise InputError(f'direction is "up" or "down", not {direction!r}{suggest(str(direction), _DIRECTIONS)}')
     if "stable" not in dataset:

@@ -22,7 +22,7 @@ import numpy as np
 
 from suboctave.atomic import replace_file
 from suboctave.errors import InputError, path_of
-from suboctave.store.layout import LAYOUT, known_layout
+from suboctave.store.layout import LAYOUT, check_layout
 from suboctave.version import __version__
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ def _read_groups(source: Path) -> dict[str, xarray.Dataset]:
     import xarray
 
     with h5py.File(source, "r") as file:
-        known_layout(file.attrs, str(source))
+        check_layout(file.attrs, str(source))
         names: list[str] = []
         file.visititems(lambda name, item: names.append(name) if isinstance(item, h5py.Group) else None)
     groups = {}

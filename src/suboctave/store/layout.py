@@ -1,42 +1,16 @@
 """How a computed curve is laid out as a labelled dataset: the one form that figures, files and tables share, and isolas
-beside the curves that they were found on.
+beside the curves that they were found on. docs/results.md describes dimensions, variables and attributes for readers.
 
-Dimensions
+`event_after` is the index of the point after which an event lies, so that the curve with its events is one line: point
+`i`, the events with `event_after == i` in their order, point `i + 1`. A free parameter other than omega is a coordinate
+as well. Read-offs that were asked for (`rms`, `velocity`, `harmonic_3`, ...; docs/pictures.md) are further variables on
+`point`, each with its own on `event`.
 
-    point        the points of the curve, in the order in which it was followed
-    event        the located bifurcations and grazing contacts, in the order in which the curve meets them
-    parameter    the system's parameters, by name
-    multiplier   the Floquet multipliers over the response period
-
-Variables on `point`: `omega` (coordinate), `amplitude`, `stable`, `harmonics`, `error`, `residual`, `multipliers`,
-`multiplier_errors`, `stability_method`, `parameters` (point x parameter). A free parameter other than omega is a
-coordinate as well, under its own name, or as "parameter.NAME" where the layout or a file uses that name. Variables on
-`event` carry the prefix `event_`; `event_after` is the index of the point after which the event lies, so that the curve
-with its events is one line: point `i`, the events with `event_after == i` in their order, point `i + 1`.
-`event_contact` names the contact that grazes at an event (empty at a smooth bifurcation), `event_contact_at` is the
-value of the free parameter at which it does. Read-offs that were asked for (`rms`, `velocity`, `harmonic_3`, ...;
-docs/pictures.md) are further variables on `point`, each with its own on `event`.
-
-Curves of bifurcations (`track`) have the attributes `tracked`, their kind, and `plane`, their two free parameters, one
-a line; `stable` means that all multipliers but the critical ones lie inside the unit circle; on `point` there is
-`coefficient`, which decides the normal form (a of limit points, c3 of period doublings, negative where they are
-supercritical; else nan), on `event` `event_extreme` ("maximum of j" at an extremum, else empty).
+Curves of bifurcations have the attributes `tracked`, their kind, and `plane`; `stable` means there that all multipliers
+but the critical ones lie inside the unit circle.
 
 A user may call a parameter "amplitude". In a table or dataset that has a column "amplitude" of its own it is called
 "parameter.amplitude", which no parameter can be named; elsewhere by its own name.
-
-Dimensions of isolas over a design parameter
-
-    isola    the isolas, in the order of the values at which they are born
-    edge     places on their edges in the plane of the frequency and the design parameter, isola after isola
-    closed   the closed branches that were followed
-
-Variables on `isola`: `period` (load periods), `from` and `to` (the range of the parameter in which it is detached),
-`born`, `born_omega` and `merges`, `merges_omega` (nan where there is no such end), `at_from` and `at_to` (what happens
-at the two ends of the range, in words), `notes`. On `edge`: `edge_isola`, its number, `edge_value`, ascending, and
-between which frequencies the closed branch lies there, `edge_low` and `edge_high`. On `closed`: `closed_isola` and
-`closed_at`, the value of the parameter. Attributes: `isolas` (the design parameter), `bounds_low`, `bounds_high`,
-`omega_low`, `omega_high` (what was asked), `said` (the result in one sentence), `notes` (one a line), `system`.
 """
 
 from __future__ import annotations
@@ -115,7 +89,7 @@ _BY_ANOTHER = frozenset({"R1", "R2", "LPPD", "LPNS", "PDNS", "NSNS"})
 class EventRow:
     """One located bifurcation, as a row of the dataset.
 
-    What the fields mean stands above; `parameters` holds those that differ from the curve's fixed ones.
+    docs/results.md says what the fields mean; `parameters` holds those that differ from the curve's fixed ones.
     """
 
     kind: str
@@ -145,7 +119,7 @@ def curve_dataset(
     options: Mapping[str, str | int | float] | None = None,
     **given: Any,
 ) -> xarray.Dataset:
-    """A curve of periodic motions as a labelled dataset; the layout is described at the top of this module.
+    """A curve of periodic motions as a labelled dataset; docs/results.md describes the layout.
 
     `parameters`: each a number, or (points,) where it varies along the curve; `free` names the one that the curve was
     followed in. `given`: variables on `point`, (points, ...), and attributes; `options`: attributes that say how the
@@ -185,7 +159,7 @@ def curve_dataset(
 
 # --------------------------------------------------------------------------------------------------------- a branch
 def branch_dataset(branch: Any) -> xarray.Dataset:
-    """A computed branch as a labelled dataset; the layout is described at the top of this module."""
+    """A computed branch as a labelled dataset; docs/results.md describes the layout."""
     rows = _event_rows(branch)
     dataset = curve_dataset(
         branch.omega,
@@ -345,12 +319,7 @@ def coordinate(dataset: xarray.Dataset, name: str) -> tuple[np.ndarray, np.ndarr
     return dataset["parameters"].to_numpy()[:, column], dataset["event_parameters"].to_numpy()[:, column]
 
 
-def check_layout(dataset: xarray.Dataset) -> None:
-    """Raises InputError when the dataset is not one that this version lays out."""
-    known_layout(dataset.attrs, "this dataset")
-
-
-def known_layout(attributes: Mapping[str, Any], what: str) -> None:
+def check_layout(attributes: Mapping[Any, Any], what: str = "this dataset") -> None:
     """Raises InputError where the attributes of `what` state no layout, or one that this version does not know."""
     if "layout" not in attributes:
         raise InputError(f"{what} was not laid out by suboctave: it has no attribute 'layout'")
@@ -386,7 +355,7 @@ def isolas_dataset(
     closed: Sequence[tuple[int, float]],
     attributes: Mapping[str, str | int | float],
 ) -> xarray.Dataset:
-    """Isolas as a labelled dataset; the layout is described at the top of this module.
+    """Isolas as a labelled dataset; docs/results.md describes the layout.
 
     `rows`: for each isola what `ISOLA_COLUMNS` names; `edges`: for each a table (places, 3) of value, lowest and
     highest frequency; `closed`: number and value of each closed branch.

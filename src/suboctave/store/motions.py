@@ -108,7 +108,7 @@ def _laid_out(
 def _checked(dataset: xarray.Dataset, dof: int | None, elements: tuple[int, ...]) -> xarray.Dataset:
     if dataset.attrs.get("contents") != _CONTENTS:
         raise InputError("this dataset is no motion: give the branch with points=, or one of its orbits")
-    check_layout(dataset)
+    check_layout(dataset.attrs)
     there = int(dataset.attrs["dof"])
     if dof is not None and dof != there:
         raise InputError(f"this dataset holds the motion of DOF {there}, not of DOF {dof}")

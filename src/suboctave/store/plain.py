@@ -17,7 +17,7 @@ import numpy as np
 
 from suboctave.errors import InputError
 from suboctave.model.description import plain_number
-from suboctave.model.system import System, build, describe
+from suboctave.model.system import System, describe
 
 if TYPE_CHECKING:
     import xarray
@@ -119,23 +119,10 @@ def padded(rows: Sequence[Any], kind: type) -> np.ndarray:
 
 
 # ---------------------------------------------------------------------------------- datasets with a record and systems
-class Prefixed(dict[str, np.ndarray]):
-    """Gives the arrays of systems names of their own among the variables of a file."""
-
-    def __init__(self, arrays: dict[str, np.ndarray]) -> None:
-        self.arrays = arrays
-
-    def __len__(self) -> int:
-        return len(self.arrays)
-
-    def __setitem__(self, key: str, value: np.ndarray) -> None:
-        self.arrays[f"system_{key}"] = value
-
-
 def written_system(system: System) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     """A system as plain data, and its large arrays as variables of a file."""
     arrays: dict[str, np.ndarray] = {}
-    return describe(system, Prefixed(arrays)), arrays
+    return describe(system, arrays), {f"system_{name}": array for name, array in arrays.items()}
 
 
 def system_arrays(dataset: xarray.Dataset) -> dict[str, np.ndarray]:
@@ -156,34 +143,15 @@ def recorded(
 ) -> xarray.Dataset:
     """A dataset as a file can hold it: with further `variables`, and what is no array as JSON in `record`.
 
-    `meaning`: of the record; `arrays`: the large ones of the systems in it.
+    `meaning`: of the record; `arrays`: the large ones of the systems in it (`describe`).
     """
     import xarray
 
     every = {str(name): (v.dims, v.values, v.attrs) for name, v in dataset.variables.items()} | dict(variables or {})
     every["record"] = ((), np.array(to_json(record), dtype=object), {"long_name": meaning})
-    every |= {name: (tuple(f"{name}_{i}" for i in range(a.ndim)), a) for name, a in (arrays or {}).items()}
+    for name, array in (arrays or {}).items():
+        every[f"system_{name}"] = (tuple(f"system_{name}_{i}" for i in range(array.ndim)), array)
     # a parameter that bears the name of a variable is in `parameters` all the same
     coordinates = [name for name in dataset.coords if name not in (variables or ())]
     stored = xarray.Dataset(dict(flat(every)), attrs=dataset.attrs)
     return stored.set_coords([name for name in coordinates if name in stored])
-
-
-class Recorded:
-    """A dataset that `recorded` wrote: its `record`, its arrays by name, and the systems in it."""
-
-    def __init__(self, dataset: xarray.Dataset, allow_code: bool, classes: Mapping[str, type] | None = None) -> None:
-        self.dataset = dataset
-        self.record: dict[str, Any] = from_json(str(dataset["record"].item()), classes)
-        self._allow_code = allow_code
-        self._arrays: dict[str, np.ndarray] = {}
-
-    def __getitem__(self, name: str) -> np.ndarray:
-        """A variable, complex where it was; each put together once."""
-        if name not in self._arrays:
-            self._arrays[name] = array_of(self.dataset, name)
-        return self._arrays[name]
-
-    def system(self, described: Mapping[str, Any]) -> System:
-        """A system of the record."""
-        return build(described, system_arrays(self.dataset), self._allow_code)

@@ -29,8 +29,8 @@ application = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-_AS_JSON = typer.Option("--json", help="One JSON object on stdout instead of text.")
-_ALLOW_CODE = typer.Option("--allow-code", help="Import and call the Python code that the file names.")
+_AsJson = Annotated[bool, typer.Option("--json", help="One JSON object on stdout instead of text.")]
+_AllowCode = Annotated[bool, typer.Option("--allow-code", help="Import and call the Python code that the file names.")]
 
 
 def _version(wanted: bool) -> None:
@@ -42,8 +42,7 @@ def _version(wanted: bool) -> None:
 @application.callback()
 def _options(
     version: Annotated[
-        bool,
-        typer.Option("--version", callback=_version, is_eager=True, help="Print the version and stop."),
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and stop.")
     ] = False,
 ) -> None:
     pass
@@ -55,7 +54,7 @@ def new(
     example: Annotated[str, typer.Option(help="What to start from; --list names them.")] = "reference_oscillator",
     names: Annotated[bool, typer.Option("--list", help="Print the examples and stop.")] = False,
     overwrite: Annotated[bool, typer.Option(help="Replace a file that is there.")] = False,
-    json_wanted: Annotated[bool, _AS_JSON] = False,
+    json_wanted: _AsJson = False,
 ) -> None:
     """Write a commented study file to start from."""
     from suboctave.atomic import free_place, replace_file
@@ -64,18 +63,17 @@ def new(
     texts = examples()
     if names:
         known = {name: text.splitlines()[0].removeprefix("# ") for name, text in texts.items()}
-        if json_wanted:
-            _answer(json_wanted, {"examples": known})
-        else:
-            print_texts(console(), ("example", "what it is"), list(known.items()), left=("example", "what it is"))
+        heads = ("example", "what it is")
+        if not _answered(json_wanted, {"examples": known}):
+            print_texts(console(), heads, list(known.items()), left=heads)
         return
     if example not in texts:
         raise InputError(f"there is no example {example!r}{suggest(example, texts)}")
     target = free_place(path, overwrite, (".toml",))
     text = texts[example].replace("THIS_FILE", str(path))
     replace_file(target, lambda place: place.write_text(text, encoding="utf-8"))
-    answer = {"file": target, "example": example}
-    _answer(json_wanted, answer, f"{target} is written; run it: suboctave run {target}")
+    if not _answered(json_wanted, {"file": target, "example": example}):
+        console().print(f"{target} is written; run it: suboctave run {target}", soft_wrap=True)
 
 
 def examples() -> dict[str, str]:
@@ -87,17 +85,18 @@ def examples() -> dict[str, str]:
 @application.command()
 def check(
     study: Annotated[Path, typer.Argument(help="The study file.")],
-    allow_code: Annotated[bool, _ALLOW_CODE] = False,
-    json_wanted: Annotated[bool, _AS_JSON] = False,
+    allow_code: _AllowCode = False,
+    json_wanted: _AsJson = False,
 ) -> None:
     """Say everything that is wrong in a study file; nothing is run."""
     from suboctave.study.file import read_study
+    from suboctave.study.screen import console
 
     checked = read_study(study, allow_code)
     names = [step.name for step in checked.steps]
     count = "1 analysis" if len(names) == 1 else f"{len(names)} analyses"
-    answer = {"analyses": names, "mistakes": []}
-    _answer(json_wanted, answer, f"{study} is in order: {count}, outputs in {checked.folder}")
+    if not _answered(json_wanted, {"analyses": names, "mistakes": []}):
+        console().print(f"{study} is in order: {count}, outputs in {checked.folder}", soft_wrap=True)
 
 
 @application.command()
@@ -109,8 +108,8 @@ def run(
         bool, typer.Option(help="Go on with a run that stopped; of a complete one, write what is missing.")
     ] = False,
     seconds: Annotated[float | None, typer.Option(help="Time limit for all analyses together.")] = None,
-    allow_code: Annotated[bool, _ALLOW_CODE] = False,
-    json_wanted: Annotated[bool, _AS_JSON] = False,
+    allow_code: _AllowCode = False,
+    json_wanted: _AsJson = False,
 ) -> None:
     """Run a study: analyses in order, then results, tables and figures."""
     from suboctave.progress import bar
@@ -125,34 +124,34 @@ def run(
 
     def report(item: Finished) -> None:
         while titles:  # above the first result: what is refused before any work has no title
-            screen.print(titles.pop(), style="bold", markup=False)
+            screen.print(titles.pop(), style="bold")
         if item.result is not None:
             note = ", taken from the earlier run" if item.reused else f" in {item.seconds:.2f} s"
             print_result(screen, item.step.name, item.result, note)
         else:
-            screen.print(f"\n{item.step.name}", style="bold", markup=False, end="")
-            screen.print(f": failed. {item.failure}", markup=False)
+            screen.print(f"\n{item.step.name}", style="bold", end="")
+            screen.print(f": failed. {item.failure}")
 
     outcome = run_study(read, out, overwrite, resume, lambda step: bar(step.name), report, seconds)
     if outcome.complete is not None:
-        screen.print(f"nothing to compute: {outcome.complete} is complete", markup=False, soft_wrap=True)
+        screen.print(f"nothing to compute: {outcome.complete} is complete", soft_wrap=True)
     elif outcome.files:
         screen.print()
     for file in outcome.files:
-        screen.print(f"written: {file}", markup=False, soft_wrap=True)
+        screen.print(f"written: {file}", soft_wrap=True)
     if others := [file.name for file in outcome.left if file != outcome.complete]:
         text = f"left as they are: {', '.join(others)} (--resume --overwrite writes them again)"
-        screen.print(text, markup=False, soft_wrap=True)
+        screen.print(text, soft_wrap=True)
     status = 0
     if outcome.interruption is not None:
         by_user = outcome.interruption == Interruption()
         status, how = (INTERRUPTED, "Go on") if by_user else (FAILED, "Give more seconds, and go on")
         why = f"{outcome.interruption}; what was computed is kept"
-        screen.print(f"{why}. {how}: suboctave run {study} --resume", markup=False)
+        screen.print(f"{why}. {how}: suboctave run {study} --resume")
     elif outcome.failed:
         status = WRONG if any(item.wrong_input for item in outcome.failed) else FAILED
         failed = ", ".join(item.step.name for item in outcome.failed)
-        screen.print(f"failed: {failed}. Change the study, and go on with --resume", markup=False)
+        screen.print(f"failed: {failed}. Change the study, and go on with --resume")
     if json_wanted:
         analyses = [
             {"name": item.step.name, "type": item.step.kind, "seconds": item.seconds}
@@ -161,7 +160,7 @@ def run(
             for item in outcome.finished
         ]
         state = {"ok": status == 0, "status": status, "interrupted": outcome.interrupted}
-        _answer(json_wanted, state | {"analyses": analyses, "files": outcome.files, "left": outcome.left})
+        _answered(json_wanted, state | {"analyses": analyses, "files": outcome.files, "left": outcome.left})
     if status:
         raise typer.Exit(status)
 
@@ -171,8 +170,8 @@ def show(
     path: Annotated[Path, typer.Argument(help="A results file (.nc), a study file (.toml), or a journal.")],
     csv: Annotated[Path | None, typer.Option(help="Write the tables as .csv files into this folder.")] = None,
     overwrite: Annotated[bool, typer.Option(help="Replace .csv files that are there.")] = False,
-    allow_code: Annotated[bool, _ALLOW_CODE] = False,
-    json_wanted: Annotated[bool, _AS_JSON] = False,
+    allow_code: _AllowCode = False,
+    json_wanted: _AsJson = False,
 ) -> None:
     """Print what a results file holds, or what a study file would run."""
     from suboctave.study.runner import JOURNAL
@@ -200,20 +199,19 @@ def _show_results(path: Path, csv: Path | None, overwrite: bool, allow_code: boo
     if not isinstance(results, Results):
         results = Results({path.stem: results if isinstance(results, Result) else results.to_table()})
     written = write_tables(results, csv, overwrite) if csv is not None else []
-    if json_wanted:
-        listed = {name: as_plain(item) for name, item in results.items()}
-        _answer(json_wanted, {"attributes": results.attributes, "analyses": listed, "files": written})
+    listed = {name: as_plain(item) for name, item in results.items()} if json_wanted else {}
+    if _answered(json_wanted, {"attributes": results.attributes, "analyses": listed, "files": written}):
         return
     screen, origin = console(), results.attributes
     if origin.get("title"):
-        screen.print(str(origin["title"]), style="bold", markup=False)
+        screen.print(str(origin["title"]), style="bold")
     if "written" in origin:
-        screen.print(f"suboctave {origin.get('suboctave')}, {origin['written']}", markup=False)
+        screen.print(f"suboctave {origin.get('suboctave')}, {origin['written']}")
     for name, item in results.items():
         seconds = results.details.get(name, {}).get("seconds")
         print_result(screen, name, item, f" in {seconds:.2f} s" if seconds is not None else "")
     for file in written:
-        screen.print(f"written: {file}", markup=False, soft_wrap=True)
+        screen.print(f"written: {file}", soft_wrap=True)
 
 
 def _show_study(path: Path, allow_code: bool, json_wanted: bool) -> None:
@@ -222,19 +220,18 @@ def _show_study(path: Path, allow_code: bool, json_wanted: bool) -> None:
 
     study = read_study(path, allow_code)
     given = {step.name: step.model_dump(mode="json", exclude_unset=True) for step in study.steps}
-    if json_wanted:
-        system = {"title": study.title, "system": repr(study.system)}
-        steps = [{"name": step.name, "type": step.kind, "arguments": given[step.name]} for step in study.steps]
-        _answer(json_wanted, {**system, "analyses": steps, "out": study.folder})
+    head = {"title": study.title, "system": repr(study.system), "out": study.folder}
+    steps = [{"name": step.name, "type": step.kind, "arguments": given[step.name]} for step in study.steps]
+    if _answered(json_wanted, head | {"analyses": steps}):
         return
     screen = console()
-    screen.print(study.title or study.source.name, style="bold", markup=False)
-    screen.print(repr(study.system), markup=False)
+    screen.print(study.title or study.source.name, style="bold")
+    screen.print(repr(study.system))
     screen.print("\nanalyses", style="bold")
     for step in study.steps:
         arguments = (f"{k} = {_written(v)}" for k, v in given[step.name].items() if k not in ("name", "type"))
-        screen.print(f"  {step.name}: {step.kind}({', '.join(arguments)})", markup=False)
-    screen.print(f"\noutputs in {study.folder}", markup=False, soft_wrap=True)
+        screen.print(f"  {step.name}: {step.kind}({', '.join(arguments)})")
+    screen.print(f"\noutputs in {study.folder}", soft_wrap=True)
 
 
 def _written(value: Any) -> str:
@@ -248,37 +245,33 @@ def _show_journal(path: Path, json_wanted: bool) -> None:
     from suboctave.study.screen import console, print_texts, significant
 
     analyses = recovered(path)
-    if json_wanted:
-        _answer(json_wanted, {"analyses": [asdict(item) for item in analyses]})
+    if _answered(json_wanted, {"analyses": [asdict(item) for item in analyses]}):
         return
     screen = console()
-    screen.print("the journal of a run that did not finish; `suboctave run ... --resume` goes on with it", markup=False)
+    screen.print("the journal of a run that did not finish; `suboctave run ... --resume` goes on with it")
     names = ("analysis", "state", "points", "bifurcations", "branches")
     rows = [(a.name, a.state, str(a.points), str(a.bifurcations), str(a.branches or "")) for a in analyses]
     print_texts(screen, names, rows, left=("analysis", "state"))
     for item in analyses:
         if item.events:
-            screen.print(f"{item.name}, so far", style="bold", markup=False)
+            screen.print(f"{item.name}, so far", style="bold")
             lines = [[kind, significant(omega, 9), significant(amplitude, 7)] for kind, omega, amplitude in item.events]
             print_texts(screen, ("kind", "omega", "max |x|"), lines, left=("kind",))
 
 
-def _answer(json_wanted: bool, content: dict[str, Any], text: str = "") -> None:
-    """What a command has to say: one JSON object, or a line."""
+def _answered(json_wanted: bool, content: dict[str, Any]) -> bool:
+    """Print what a command has to say as one JSON object, where that is wanted; whether it was."""
     if json_wanted:
         from suboctave.study.shown import to_json
 
         print(to_json({"ok": True} | content))
-    else:
-        from suboctave.study.screen import console
-
-        console().print(text, markup=False, soft_wrap=True)
+    return json_wanted
 
 
 @application.command()
 def demo(
     out: Annotated[Path, typer.Option(help="Folder for the figures; made where it is missing.")] = Path("demo"),
-    json_wanted: Annotated[bool, _AS_JSON] = False,
+    json_wanted: _AsJson = False,
 ) -> None:
     """Compute and draw the response of an oscillator that rattles between two stops."""
     from suboctave.study.demo import run_demo
@@ -336,10 +329,8 @@ def _readable(text: str) -> str:
     if not sys.stderr.isatty():
         return text
     import shutil
-    import textwrap
+    from textwrap import TextWrapper
 
     width = min(80, shutil.get_terminal_size().columns)
-    fill = partial(
-        textwrap.fill, width=width, subsequent_indent=" " * 6, break_long_words=False, break_on_hyphens=False
-    )
-    return "\n".join(map(fill, text.splitlines()))
+    wrapper = TextWrapper(width, subsequent_indent=" " * 6, break_long_words=False, break_on_hyphens=False)
+    return "\n".join(map(wrapper.fill, text.splitlines()))

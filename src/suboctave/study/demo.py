@@ -112,28 +112,27 @@ def run_demo(out: Path, json_wanted: bool = False) -> None:
         "    x'' + 2 zeta x' + x + alpha x^3 + Fc(x) = p cos(omega t)\n"
         f"zeta = 0.03, alpha = 0.16, Kc = 4.7, stops regularised with s = {REGULARIZATION:g};\n"
         f"omega from {OMEGA[0]:g} to {OMEGA[1]:g}.",
-        markup=False,
     )
     curves: list[Branch] = []
     for case in CASES:
         with bar(str(case)) as report:
             curve = compute(case, report)
         curves.append(curve)
-        screen.print(f"\n{case}: {case.title}", style="bold", markup=False)
+        screen.print(f"\n{case}: {case.title}", style="bold")
         print_events(screen, event_lines(curve.to_xarray()))
-        screen.print(f"{len(curve)} points in {curve.seconds:.2f} s; {curve.ended}.", markup=False)
+        screen.print(f"{len(curve)} points in {curve.seconds:.2f} s; {curve.ended}.")
         if curve.interrupted:
             break
     screen.print()
     figures = draw(curves, out)
     for path in figures:
-        screen.print(f"figure: {path}", markup=False, soft_wrap=True)
+        screen.print(f"figure: {path}", soft_wrap=True)
     interrupted = curves[-1].interrupted
     if not interrupted:
         with bar("what hides beside them") as report:
             hidden = sequel(curves[1], CASES[2].system, out, report)
         for text, path in hidden:
-            screen.print(f"\n{text}\nfigure: {path}", markup=False, soft_wrap=True)
+            screen.print(f"\n{text}\nfigure: {path}", soft_wrap=True)
             figures.append(path)
     if json_wanted:
         listed = [

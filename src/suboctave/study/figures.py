@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
 
 from suboctave.curves.junction import period_name
 from suboctave.errors import InputError, Key, chosen_dof, suggest
@@ -21,7 +21,7 @@ from suboctave.model.system import System
 from suboctave.pictures import View, plot_boundaries, plot_history, plot_phase, plot_response, plot_space, plot_spectrum
 from suboctave.pictures.boundary import datasets_of
 from suboctave.pictures.options import DERIVATIVES, MotionView, as_multiple
-from suboctave.pictures.style import size_in_inches
+from suboctave.pictures.style import checked_text, size_in_inches
 from suboctave.results.branch import Branch
 from suboctave.results.diagram import BifurcationDiagram
 from suboctave.results.readings import gapped_elements
@@ -31,6 +31,20 @@ from suboctave.study.steps.base import CheckContext, Complaint, Motion, Step, tr
 
 _VIEW = [field.name for field in fields(View)]
 _Limits = Annotated[list[float], Field(min_length=2, max_length=2)]
+
+
+def _refused_by(check: Callable[[Any], Any]) -> AfterValidator:
+    """A value that stays as it is given where `check` does not refuse it."""
+    return AfterValidator(lambda given: (check(given), given)[1])
+
+
+#: what is written on a figure
+_Text = Annotated[str, _refused_by(checked_text)]
+_Size = Annotated[Any, _refused_by(size_in_inches)]
+#: a number, or a fraction as text: "1/3"
+_Multiple = Annotated[float, BeforeValidator(as_multiple)]
+#: the kinds of figures
+FIGURES: dict[str, type[Figure]] = {}
 
 
 @dataclass(frozen=True)
@@ -47,38 +61,35 @@ class StudyCurves:
 
 
 class Figure(BaseModel):
-    """One figure; its form follows the suffix of `file`."""
+    """One figure; its form follows the suffix of `file`. A class of figures is given its `kind` and what draws it."""
 
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
-    kind: str
+    plot: ClassVar[Callable[..., Any]]
+
+    kind: str = "response"
     file: str
     dof: int | None = None
     frequency: str | None = None
     omega_reference: float | None = None
     scale: float | None = None
-    unit: str | None = None
-    xlabel: str | None = None
-    ylabel: str | None = None
-    title: str | None = None
-    size: Any = None
+    unit: _Text | None = None
+    xlabel: _Text | None = None
+    ylabel: _Text | None = None
+    title: _Text | None = None
+    size: _Size | None = None
 
-    @property
-    def texts(self) -> Iterator[tuple[Key, str]]:
-        """What is written on it, with the key of each."""
-        for key in ("title", "unit", "xlabel", "ylabel", "zlabel"):
-            if getattr(self, key, None) is not None:
-                yield (key,), getattr(self, key)
-        for i, label in enumerate(getattr(self, "labels", None) or ()):
-            yield ("labels", i), label
+    def __init_subclass__(cls, kind: str = "", plot: Callable[..., Any] | None = None, **more: Any) -> None:
+        super().__init_subclass__(**more)
+        if plot is not None:
+            cls.plot = staticmethod(plot)
+            FIGURES[kind] = cls
 
     def check(self, study: StudyCurves) -> Iterator[Complaint]:
         """What is wrong with it, before any work."""
-        yield from tried("size", lambda: self.size is None or size_in_inches(self.size))
-        if study.system is None:
-            return
-        count = study.system.n
-        yield from tried("dof", lambda: chosen_dof(self.dof, 0, count))
+        if study.system is not None:
+            count = study.system.n
+            yield from tried("dof", lambda: chosen_dof(self.dof, 0, count))
 
     def draw(self, results: Mapping[str, Result], path: Path) -> bool:
         """Draw it; False where what it shows is not there.
@@ -91,20 +102,12 @@ class Figure(BaseModel):
 class CurveFigure(Figure):
     """One figure of curves; what is drawn follows the keys of `View`."""
 
-    plot: ClassVar[Callable[..., Any]]
-
     analyses: list[str] = Field(default_factory=list)
     x: str | None = None
-    size: Any = (6.4, 4.2)
+    size: _Size | None = (6.4, 4.2)
     quantity: str = ""
-    harmonic: float | None = None
+    harmonic: _Multiple | None = None
     element: int | None = None
-
-    @field_validator("harmonic", mode="before")
-    @classmethod
-    def _multiple(cls, given: Any) -> Any:
-        """A number, or a fraction as text: "1/3"."""
-        return None if given is None else as_multiple(given)
 
     @property
     def view(self) -> View:
@@ -128,6 +131,8 @@ class CurveFigure(Figure):
             given = getattr(self, key, None)
             if system is not None and given is not None and given not in parameters:
                 yield (key,), f"neither omega nor a parameter{suggest(given, parameters)}"
+        if self.x is not None and self.x == getattr(self, "y", None):
+            yield ("y",), f"is {self.x!r}, which is x as well"
         labels, drawn = getattr(self, "labels", None), len(self.drawn(planes))
         if labels is not None and len(labels) != drawn:
             yield ("labels",), f"{len(labels)} labels for {drawn} curves"
@@ -154,8 +159,6 @@ class CurveFigure(Figure):
         planes = {name: getattr(item, "plane", None) for name, item in results.items() if isinstance(item, _CURVES)}
         every = self.drawn(planes)
         there = [name for name in every if name in results and drawable(results[name])]
-        if not there:
-            return False
         view = self.view
         given: list[str] | None = getattr(self, "labels", None)
         drawn = [
@@ -215,20 +218,18 @@ def _branches_of(item: Result) -> list[Branch]:
 class PlaneFigure(CurveFigure):
     """Curves in a plane: their names, what of the axes is shown, and the kinds of events that are marked."""
 
-    labels: list[str] | None = None
+    labels: list[_Text] | None = None
     xlim: _Limits | None = None
     ylim: _Limits | None = None
     marks: list[str] | None = None
 
 
-class ResponseFigure(PlaneFigure):
+class ResponseFigure(PlaneFigure, kind="response", plot=plot_response):
     """Response curves. Curves of bifurcations are drawn among them where `x` is given and they are named.
 
     Of isolas that are named the closed branches known are drawn, or those at the values `at`.
     """
 
-    plot: ClassVar[Callable[..., Any]] = staticmethod(plot_response)
-    kind: str = "response"
     at: list[float] | None = None
 
     def drawn(self, planes: Mapping[str, tuple[str, str] | None]) -> list[str]:
@@ -246,11 +247,9 @@ class ResponseFigure(PlaneFigure):
                 yield ("analyses", i), f'{name!r} is a curve of bifurcations: kind = "boundary" draws it, or give x'
 
 
-class BoundaryFigure(PlaneFigure):
+class BoundaryFigure(PlaneFigure, kind="boundary", plot=plot_boundaries):
     """Curves of bifurcations and regions of isolas in the plane of two parameters; with a `quantity`, this upwards."""
 
-    plot: ClassVar[Callable[..., Any]] = staticmethod(plot_boundaries)
-    kind: Literal["boundary"]
     y: str | None = None
 
     @property
@@ -276,7 +275,6 @@ class BoundaryFigure(PlaneFigure):
             yield ("y",), "is a parameter; with a quantity that is what is drawn upwards: leave one of them out"
         if len(planes) > 1 and (self.x is None or (self.y is None and not self.projected)):
             yield (), "the curves are tracked in different parameters: choose x and y, or fewer analyses"
-        yield from _same(self.x, self.y)
         if len(planes) == 1 and (self.x is None) != (self.y is None) and not self.projected:
             key, given = ("x", self.x) if self.x is not None else ("y", self.y)
             (plane,) = planes
@@ -290,17 +288,15 @@ class BoundaryFigure(PlaneFigure):
         return {**super().options(labels, view), "y": self.y, "projected": self.projected}
 
 
-class SpaceFigure(CurveFigure):
+class SpaceFigure(CurveFigure, kind="space", plot=plot_space):
     """Response curves at several values of a parameter, and curves of bifurcations through them, in space.
 
     Of isolas the closed branches known are drawn, or those at the values `at`.
     """
 
-    plot: ClassVar[Callable[..., Any]] = staticmethod(plot_space)
-    kind: Literal["space"]
     y: str | None = None
-    size: Any = (6.4, 5.0)
-    zlabel: str | None = None
+    size: _Size | None = (6.4, 5.0)
+    zlabel: _Text | None = None
     elevation: float = 24.0
     azimuth: float = -58.0
     at: list[float] | None = None
@@ -312,7 +308,6 @@ class SpaceFigure(CurveFigure):
         yield from super().check(study)
         curves = study.planes
         planes = {curves.get(name) for name in self.drawn(curves)} - {None}
-        yield from _same(self.x, self.y)
         if self.x is not None and self.y is not None:
             return
         if len(planes) > 1:
@@ -339,21 +334,15 @@ def _closed(datasets: Mapping[str, Any], values: Sequence[float] | None) -> list
     return [dataset for dataset, place in zip(closed, places, strict=True) if values is None or place in values]
 
 
-def _same(x: str | None, y: str | None) -> Iterator[Complaint]:
-    if x is not None and x == y:
-        yield ("y",), f"is {x!r}, which is x as well"
-
-
 # ------------------------------------------------------------------------------------------------------------ motions
 class MotionFigure(Figure):
     """One figure of motions, each chosen as `start` chooses one."""
 
-    plot: ClassVar[Callable[..., Any]]
     quantities: ClassVar[Sequence[str]] = ("displacement",)
 
     motions: list[Motion] = Field(min_length=1)
     overlay: bool = False
-    labels: list[str] | None = None
+    labels: list[_Text] | None = None
 
     def check(self, study: StudyCurves) -> Iterator[Complaint]:
         curves = list(study.planes)
@@ -394,39 +383,21 @@ class MotionFigure(Figure):
         return True
 
 
-class PhaseFigure(MotionFigure):
+class PhaseFigure(MotionFigure, kind="phase", plot=plot_phase):
     """Phase portraits."""
 
-    plot: ClassVar[Callable[..., Any]] = staticmethod(plot_phase)
-    kind: Literal["phase"]
 
-
-class SpectrumFigure(MotionFigure):
+class SpectrumFigure(MotionFigure, kind="spectrum", plot=plot_spectrum):
     """Spectra."""
 
-    plot: ClassVar[Callable[..., Any]] = staticmethod(plot_spectrum)
     quantities: ClassVar[Sequence[str]] = tuple(DERIVATIVES)
-    kind: Literal["spectrum"]
     quantity: str = "displacement"
     highest: float | None = Field(default=None, gt=0)
 
 
-class HistoryFigure(MotionFigure):
+class HistoryFigure(MotionFigure, kind="history", plot=plot_history):
     """Time histories."""
 
-    plot: ClassVar[Callable[..., Any]] = staticmethod(plot_history)
     quantities: ClassVar[Sequence[str]] = (*DERIVATIVES, "force")
-    kind: Literal["history"]
     quantity: str = "displacement"
     element: int | None = None
-
-
-#: by the `kind` of a figure
-FIGURES: dict[str, type[Figure]] = {
-    "response": ResponseFigure,
-    "boundary": BoundaryFigure,
-    "space": SpaceFigure,
-    "phase": PhaseFigure,
-    "spectrum": SpectrumFigure,
-    "history": HistoryFigure,
-}

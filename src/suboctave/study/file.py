@@ -110,10 +110,8 @@ def read_study(path: str | Path, allow_code: bool = False) -> Study:
     outputs = _outputs(sections.outputs, steps, system, mistakes)
     mistakes.refuse()
     assert system is not None
-    assert outputs is not None
-    return Study(
-        source, text, sections.title, system, tuple(s for s in steps if s), outputs, allow_code, sections.seconds
-    )
+    every = tuple(step for step in steps if step)
+    return Study(source, text, sections.title, system, every, outputs, allow_code, sections.seconds)
 
 
 def _refused(source: Path, message: str, line: int = 0) -> StudyError:
@@ -213,29 +211,24 @@ def _steps(
     return steps
 
 
-def _outputs(
-    given: dict[str, Any], steps: list[Step | None], system: System | None, mistakes: Mistakes
-) -> Outputs | None:
+def _outputs(given: dict[str, Any], steps: list[Step | None], system: System | None, mistakes: Mistakes) -> Outputs:
     plain = dict(given)
     figures = plain.pop("figures", [])
-    sections: list[Figure] = []
+    sections: list[Figure | None] = []
     if not isinstance(figures, list) or not all(isinstance(item, dict) for item in figures):
         mistakes.add(("outputs", "figures"), "are tables: [[outputs.figures]], each with a file")
         figures = []
     for index, item in enumerate(figures):
         kind, place = item.get("kind", "response"), ("outputs", "figures", index)
-        if not isinstance(kind, str) or kind not in FIGURES:
+        if isinstance(kind, str) and kind in FIGURES:
+            sections.append(_validated(FIGURES[kind], item, place, mistakes))
+        else:
+            sections.append(None)
             mistakes.add((*place, "kind"), f"there is no figure of the kind {kind!r}{suggest(str(kind), FIGURES)}")
-            continue
-        figure = _validated(FIGURES[kind], item, place, mistakes)
-        if figure is not None:
-            sections.append(figure)
-    outputs = _validated(Outputs, plain, ("outputs",), mistakes)
-    if outputs is None or len(sections) < len(figures):
-        return None
-    complete: Outputs = outputs.model_copy(update={"figures": sections})
-    known = {step.name: step for step in steps if step is not None}
+    outputs: Outputs = _validated(Outputs, plain, ("outputs",), mistakes, rest=True)
+    outputs = outputs.model_copy(update={"figures": sections})
     if steps and None not in steps:
-        for key, text in check_outputs(complete, StudyCurves(known, system)):
+        known = {step.name: step for step in steps if step is not None}
+        for key, text in check_outputs(outputs, StudyCurves(known, system)):
             mistakes.add(("outputs", *key), text)
-    return complete
+    return outputs

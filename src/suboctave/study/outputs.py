@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from pathlib import Path, PurePath
 from typing import Any
@@ -14,15 +14,13 @@ from suboctave.atomic import free_place
 from suboctave.errors import InputError, Key
 from suboctave.maps.isolas.result import Isolas
 from suboctave.pictures.paper import SUFFIXES
-from suboctave.pictures.style import checked_text
-from suboctave.results.branch import Branch
 from suboctave.results.diagram import BifurcationDiagram
+from suboctave.store.table import Table
 from suboctave.study.figures import StudyCurves, drawable
 from suboctave.study.results import Result, Results
 from suboctave.study.steps import Step
-from suboctave.study.steps.base import Complaint, tried
+from suboctave.study.steps.base import Complaint, Gives
 
-_STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 #: bytes of a file name: disks take 255, and half a name more is needed while it is written
 _LONGEST = 200
 
@@ -30,7 +28,7 @@ _LONGEST = 200
 class Outputs(BaseModel):
     """What is written into `folder` (default: the study's name with _results, beside the study file)."""
 
-    model_config = _STRICT
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
     folder: str | None = Field(default=None, min_length=1)
     results: str = "results.nc"
@@ -41,52 +39,49 @@ class Outputs(BaseModel):
 
 def check_outputs(outputs: Outputs, study: StudyCurves) -> Iterator[Complaint]:
     """What is wrong with the outputs, before any work: key and message."""
-    steps = list(study.steps.values())
+    tables = csv_names(study.steps.values()) if outputs.csv else []
     names: list[tuple[Key, str, Sequence[str]]] = [(("results",), outputs.results, (".nc",))]
     if outputs.html is not None:
         names.append((("html",), outputs.html, (".html", ".htm")))
     for index, figure in enumerate(outputs.figures):
-        key = ("figures", index)
-        names.append(((*key, "file"), figure.file, SUFFIXES))
-        for where, text in figure.texts:
-            yield from (((*key, *where), why) for _, why in tried("", partial(checked_text, text)))
-        yield from (((*key, *where), text) for where, text in figure.check(study))
-    seen: dict[str, str] = dict.fromkeys(csv_names(steps) if outputs.csv else (), "csv")
-    if outputs.csv and len(seen) < len(csv_names(steps)):
+        if figure is None:  # what is wrong in it is told already
+            continue
+        names.append((("figures", index, "file"), figure.file, SUFFIXES))
+        yield from ((("figures", index, *where), text) for where, text in figure.check(study))
+    seen = set(tables)
+    if len(seen) < len(tables):
         yield ("csv",), "two analyses would write the same table: rename the one that ends in _bifurcations"
-    if outputs.folder is not None and not _printable(outputs.folder):
+    if outputs.folder is not None and not outputs.folder.isprintable():
         yield ("folder",), f"{outputs.folder!r} has characters that no name has"
     for place, name, suffixes in names:
         if PurePath(name).suffix.lower() not in suffixes:
             yield place, f"{name!r} must end in {' or '.join(suffixes)}"
         if PurePath(name).name != name or name in (".", ".."):
             yield place, f"{name!r} is a name inside the folder of the outputs, without slashes"
-        elif not _printable(name):
+        elif not name.isprintable():
             yield place, f"{name!r} has characters that no name has"
         elif len(os.fsencode(name)) > _LONGEST:
             yield place, f"a name of {len(name)} characters is too long for a file: at most {_LONGEST}"
         elif name in seen:
             yield place, f"{name!r} is written twice: choose another name"
-        seen[name] = name
+        seen.add(name)
 
 
-def _printable(name: str) -> bool:
-    return all(character.isprintable() for character in name)
+#: the tables of what an analysis gives: how the name of each ends, after the mark what `to_csv` is asked for
+_TABLES: dict[Gives, tuple[str, ...]] = {
+    "table": ("",),
+    "branch": ("", "_bifurcations"),
+    "diagram": ("", "_bifurcations"),
+    "isolas": ("", "_points", "_bifurcations"),
+}
 
 
-def csv_names(steps: Sequence[Step]) -> list[str]:
+def csv_names(steps: Iterable[Step]) -> list[str]:
     """The names of the tables that `csv = true` writes."""
-    names = []
-    for step in steps:
-        names.append(f"{step.name}.csv")
-        if step.gives == "isolas":
-            names.append(f"{step.name}_points.csv")
-        if step.gives != "table":
-            names.append(f"{step.name}_bifurcations.csv")
-    return names
+    return [f"{step.name}{ending}.csv" for step in steps for ending in _TABLES[step.gives]]
 
 
-def places(outputs: Outputs, steps: Sequence[Step], folder: Path) -> list[Path]:
+def places(outputs: Outputs, steps: Iterable[Step], folder: Path) -> list[Path]:
     """Every file that the study will write."""
     names = [outputs.results, *(figure.file for figure in outputs.figures)]
     names += csv_names(steps) if outputs.csv else []
@@ -124,7 +119,12 @@ def write_outputs(
 
         # of isolas that none was found is said
         worth = {name: item for name, item in results.items() if isinstance(item, Isolas) or len(item)}
-        shown = {name: _shown(item, results.details.get(name, {})) for name, item in worth.items()}
+        shown: dict[str, Any] = {
+            name: item
+            if isinstance(item, BifurcationDiagram | Isolas)
+            else item.to_xarray().assign_attrs(seconds=results.details.get(name, {}).get("seconds", float("nan")))
+            for name, item in worth.items()
+        }
         write_report(shown, path, title=title or "Study", overwrite=True)
         yield path
     if missing:
@@ -132,28 +132,27 @@ def write_outputs(
         raise InputError("; ".join([*missing, rest]))
 
 
-def _shown(item: Result, details: Mapping[str, Any]) -> Any:
-    """What the report page is told of a result."""
-    if isinstance(item, BifurcationDiagram | Isolas):
-        return item
-    return item.to_xarray().assign_attrs(seconds=details.get("seconds", float("nan")))
-
-
 def tables_of(name: str, item: Result, folder: Path) -> Iterator[tuple[Path, Callable[..., Path]]]:
     """The tables of a result: where each goes, and what writes it."""
-    yield folder / f"{name}.csv", item.to_csv
-    if isinstance(item, Isolas):
-        yield folder / f"{name}_points.csv", partial(item.to_csv, what="points")
-    if isinstance(item, Branch | BifurcationDiagram | Isolas):
-        yield folder / f"{name}_bifurcations.csv", partial(item.to_csv, what="bifurcations")
+    gives: Gives = "isolas" if isinstance(item, Isolas) else "table" if isinstance(item, Table) else "branch"
+    for ending in _TABLES[gives]:
+        asked: dict[str, Any] = {"what": ending[1:]} if ending else {}
+        yield folder / f"{name}{ending}.csv", partial(item.to_csv, **asked)
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder that files are written into; InputError where that cannot be."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"the folder {folder} cannot be made: {error.strerror}; write elsewhere with --out") from None
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise InputError(f"the folder {folder} is not writable: write elsewhere with --out")
 
 
 def write_tables(results: Results, folder: Path, overwrite: bool) -> list[Path]:
     """All tables of some results, into a folder that is made; InputError where one exists and is not to be replaced."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"the folder {folder} cannot be made: {error.strerror}") from None
+    make_folder(folder)
     jobs = [job for name, item in results.items() for job in tables_of(name, item, folder)]
     for path, _ in jobs:
         free_place(path, overwrite)

@@ -131,7 +131,12 @@ def load(path: str | Path, *, allow_code: bool = False, linear: LinearPart | Non
         if root.attrs.get("contents") in registry.CODECS:
             item: Saved = registry.from_datasets(groups, allow_code, linear)[0]
             return item
-        for name, parts in _by_analysis(groups).items():
+        analyses: dict[str, dict[str, xarray.Dataset]] = {}  # "diagram" and "diagram/branch_0" are parts of one
+        for place, dataset in groups.items():
+            name, _, part = place.partition("/")
+            if name:
+                analyses.setdefault(name, {})[part] = dataset
+        for name, parts in analyses.items():
             item, details = registry.from_datasets(parts, allow_code, linear)
             read[name] = item.to_table() if isinstance(item, TimeResult) else item, details
     except InputError as error:
@@ -140,13 +145,3 @@ def load(path: str | Path, *, allow_code: bool = False, linear: LinearPart | Non
     names = sorted(read, key=lambda name: order.index(name) if name in order else len(order))
     attributes = {str(name): value for name, value in root.attrs.items()}
     return Results({n: read[n][0] for n in names}, attributes, {n: read[n][1] for n in names})
-
-
-def _by_analysis(groups: Mapping[str, xarray.Dataset]) -> dict[str, dict[str, xarray.Dataset]]:
-    """The groups of a study's file by analysis: "diagram" and "diagram/branch_0" are parts of one."""
-    parts: dict[str, dict[str, xarray.Dataset]] = {}
-    for path, dataset in groups.items():
-        name, _, part = path.partition("/")
-        if name:
-            parts.setdefault(name, {})[part] = dataset
-    return parts

@@ -11,7 +11,6 @@ those of their curves and closed branches, "part"; before that of a table those 
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, closing, nullcontext
 from dataclasses import dataclass, field
@@ -24,11 +23,11 @@ from suboctave.experiments.common import TimeResult
 from suboctave.interruption import Interruption, check_seconds, time_limit
 from suboctave.maps.isolas.result import Isolas
 from suboctave.results.branch import Branch
-from suboctave.store.journal import Journal, Record, read_journal
+from suboctave.store.journal import Journal, read_journal
 from suboctave.store.registry import from_datasets, to_datasets
 from suboctave.store.table import Table
 from suboctave.study.file import Study
-from suboctave.study.outputs import places, write_outputs
+from suboctave.study.outputs import make_folder, places, write_outputs
 from suboctave.study.results import Result, Results, load
 from suboctave.study.steps import Context, Step
 
@@ -137,10 +136,12 @@ def run_study(
                     unfinished.add(step.name)
                 if done.result is not None:
                     results[step.name] = done.result
-                    key = "" if step.name in unfinished else study.keys[step.name]
-                    arguments = step.model_dump_json(exclude_defaults=True)
-                    own = {"type": step.kind, "seconds": done.seconds, "key": key, "arguments": arguments}
-                    details[step.name] = own
+                    details[step.name] = {
+                        "type": step.kind,
+                        "seconds": done.seconds,
+                        "key": "" if step.name in unfinished else study.keys[step.name],
+                        "arguments": step.model_dump_json(exclude_defaults=True),
+                    }
                 if done.result is not None or done.failure:
                     outcome.finished.append(done)
                     if report is not None:
@@ -160,11 +161,7 @@ def run_study(
 
 def _prepare(place: Path, targets: list[Path], journal: Path, overwrite: bool, resume: bool) -> None:
     """Make the folder and refuse what must not be overwritten, before any work."""
-    try:
-        place.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"the folder {place} cannot be made: {error.strerror}; write elsewhere with --out") from None
-    _check_folder(place)
+    make_folder(place)
     if overwrite and not resume:
         if journal.exists():
             Journal.reopen(journal).remove()
@@ -183,11 +180,6 @@ def _prepare(place: Path, targets: list[Path], journal: Path, overwrite: bool, r
             f"{place} already holds {', '.join(there[:3])}{more}, left as it is: --overwrite replaces it, --out writes "
             "elsewhere"
         )
-
-
-def _check_folder(place: Path) -> None:
-    if not os.access(place, os.W_OK | os.X_OK):
-        raise InputError(f"the folder {place} is not writable: write elsewhere with --out")
 
 
 def _written(
@@ -215,7 +207,7 @@ def _complete(study: Study, place: Path, targets: list[Path], overwrite: bool) -
     ]
     left = [] if overwrite else [target for target in targets if target.exists()]
     if len(left) < len(targets):
-        _check_folder(place)
+        make_folder(place)
     files = _written(study, {name: results[name] for name in names}, details, place, left)
     return Outcome(finished, files, complete=path, left=left)
 
@@ -224,9 +216,8 @@ def _one(
     study: Study, step: Step, results: dict[str, Result], journal: Journal, watch: Watch | None, whole: bool
 ) -> Finished:
     """What came of one analysis; `whole`: what it starts from is complete, and so it may be kept as complete."""
-    key = study.keys[step.name]
-    kept = finished(journal.records, key, study.allow_code) if whole else None
-    if kept is not None:
+    noted = Noting(journal, step.name, study.keys[step.name], study.allow_code)
+    if whole and (kept := noted.finished()) is not None:
         result, attributes = kept
         return Finished(step, result, float(attributes.get("seconds", 0.0)), reused=True)
     missing = [name for _, name in step.needs() if name not in results]
@@ -239,101 +230,82 @@ def _one(
     with nullcontext() if watch is None else watch(step) as progress:
         try:
             system = study.system.with_parameters(step.parameters) if step.parameters else study.system
-            keeper = BranchKeeper(journal, step.name, key, study.allow_code) if whole else None
-            noted = Noting(journal, step.name, progress)
+            noted.progress = progress
             with time_limit(step.seconds):
-                outcome = step.run(Context(system, results, noted, study.allow_code, keeper))
+                outcome = step.run(Context(system, results, noted, study.allow_code, noted if whole else None))
         except KeyboardInterrupt as cause:
             interruption = Interruption.of(cause)
         except TimeLimitError as error:
             failure, interruption = str(error), Interruption(step.seconds)
-        except ConvergenceError as error:
-            failure = str(error)
-        except InputError as error:
-            failure, wrong = str(error), True
+        except (ConvergenceError, InputError) as error:
+            failure, wrong = str(error), isinstance(error, InputError)
         except ArithmeticError as error:  # a size of 1e200 whose square is no number
             failure = f"the numbers grew too large or too small ({error}): choose units in which they are nearer to 1"
     seconds = perf_counter() - begin
     if outcome is not None:
         interruption = interruption or outcome.interruption
         if interruption is None and whole:
-            keep(journal, step.name, key, outcome, seconds)
+            noted.finish(outcome, seconds)
     return Finished(step, outcome, seconds, False, failure, wrong, interruption)
 
 
 # ------------------------------------------------------------------------------------------------------- the journal
-def keep(journal: Journal, name: str, key: str, result: Result, seconds: float) -> None:
-    """A finished analysis, on the disk when this returns; the branches of a diagram are there already."""
-    datasets = to_datasets(result, {"seconds": seconds})
-    place = {"name": name, "key": key}
-    parts = datasets.items() if isinstance(result, Isolas | Table) else ()
-    entries = [("part", {**place, "part": part}, dataset) for part, dataset in parts if part]
-    journal.extend([*entries, ("analysis", place, datasets[""])])
+class Noting:
+    """What the journal holds of one analysis: points and branches as they come, and in the end all of it.
 
+    It is the `progress=` of its verb, which passes reports on to `progress`, and what keeps the branches of a diagram
+    (`suboctave.analysis.diagram.Keeper`).
+    """
 
-def finished(records: Sequence[Record], key: str, allow_code: bool) -> tuple[Result, dict[str, Any]] | None:
-    """The finished analysis with this key, and the attributes of its dataset; None if there is none."""
-    own = [record for record in records if record.kind == "analysis" and record.fields["key"] == key]
-    if not own:
-        return None
-    groups: dict[str, xarray.Dataset] = {"": own[-1].dataset}
-    if groups[""].attrs.get("contents") == "diagram":
-        branches = _branches(records, key)
-        places = zip(groups[""]["parent"].values, groups[""]["origin"].values, strict=True)
-        for number, (parent, event) in enumerate(places):
-            groups[f"branch_{number}"] = branches[int(parent), int(event)].dataset
-    elif "parts" in groups[""].attrs:
-        parts = {r.fields["part"]: r for r in records if r.kind == "part" and r.fields["key"] == key}
-        groups |= {part: parts[part].dataset for part in str(groups[""].attrs["parts"]).splitlines()}
-    result, details = from_datasets(groups, allow_code)
-    assert not isinstance(result, TimeResult)
-    return result, details
+    def __init__(self, journal: Journal, name: str, key: str, allow_code: bool = False, progress: Any = None) -> None:
+        self.journal, self.name, self.key, self.allow_code, self.progress = journal, name, key, allow_code, progress
+        self.since = perf_counter()
+        self.points = self.events = 0
+        self._own = [record for record in journal.records if record.fields.get("key") == key]
+        self._branches = {(r.fields["parent"], r.fields["event"]): r for r in self._own if r.kind == "branch"}
 
+    def finished(self) -> tuple[Result, dict[str, Any]] | None:
+        """The analysis that an earlier run finished, and the attributes of its dataset; None if there is none."""
+        heads = [record for record in self._own if record.kind == "analysis"]
+        if not heads:
+            return None
+        groups: dict[str, xarray.Dataset] = {"": heads[-1].dataset}
+        if groups[""].attrs.get("contents") == "diagram":
+            places = zip(groups[""]["parent"].values, groups[""]["origin"].values, strict=True)
+            for number, (parent, event) in enumerate(places):
+                groups[f"branch_{number}"] = self._branches[int(parent), int(event)].dataset
+        elif "parts" in groups[""].attrs:
+            parts = {record.fields["part"]: record for record in self._own if record.kind == "part"}
+            groups |= {part: parts[part].dataset for part in str(groups[""].attrs["parts"]).splitlines()}
+        result, details = from_datasets(groups, self.allow_code)
+        assert not isinstance(result, TimeResult)
+        return result, details
 
-def _branches(records: Sequence[Record], key: str) -> dict[tuple[int, int], Record]:
-    return {
-        (record.fields["parent"], record.fields["event"]): record
-        for record in records
-        if record.kind == "branch" and record.fields["key"] == key
-    }
-
-
-class BranchKeeper:
-    """Keeps the branches of a diagram in the journal when they are complete, and knows those of an earlier run."""
-
-    def __init__(self, journal: Journal, name: str, key: str, allow_code: bool) -> None:
-        self.journal, self.name, self.key, self.allow_code = journal, name, key, allow_code
-        self._known = _branches(journal.records, key)
+    def finish(self, result: Result, seconds: float) -> None:
+        """All of it, on the disk when this returns; the branches of a diagram are there already."""
+        datasets = to_datasets(result, {"seconds": seconds})
+        place = {"name": self.name, "key": self.key}
+        parts = [part for part in datasets if part and isinstance(result, Isolas | Table)]
+        entries = [("part", {**place, "part": part}, datasets[part]) for part in parts]
+        self.journal.extend([*entries, ("analysis", place, datasets[""])])
 
     def known(self, parent: int, event: int) -> Branch | None:
-        """See `suboctave.analysis.diagram.Keeper`."""
-        record = self._known.get((parent, event))
-        if record is None:
-            return None
-        branch, _ = from_datasets({"": record.dataset}, self.allow_code)
-        assert isinstance(branch, Branch)
+        """A branch of a diagram that an earlier run kept."""
+        record = self._branches.get((parent, event))
+        branch: Branch | None = None if record is None else from_datasets({"": record.dataset}, self.allow_code)[0]
         return branch
 
     def keep(self, parent: int, event: int, branch: Branch) -> None:
-        """See `suboctave.analysis.diagram.Keeper`."""
+        """A branch of a diagram that is complete."""
         place = {"name": self.name, "key": self.key, "parent": parent, "event": event}
         self.journal.append("branch", place, to_datasets(branch)[""])
-
-
-class Noting:
-    """A `progress=` that passes reports on and writes what there is so far to the journal now and then."""
-
-    def __init__(self, journal: Journal, name: str, progress: Any) -> None:
-        self.journal, self.name, self.progress = journal, name, progress
-        self.since = perf_counter()
-        self.points = self.events = 0
 
     def __call__(self, share: float, where: str) -> None:
         if self.progress is not None:
             self.progress(share, where)
 
     def followed(self, trace: Any) -> None:
-        """Called at each point of a curve with what there is of it so far."""
+        """Called at each point of a curve with what there is of it so far, which is written down now and then."""
         now = perf_counter()
         events = len(trace.bifurcations)
         if now - self.since < _OFTEN and events == self.events:
@@ -373,27 +345,27 @@ def recovered(path: str | Path) -> list[Recovered]:
     """What a journal holds, analysis by analysis."""
     analyses: dict[str, Recovered] = {}
     for record in read_journal(path):
-        name = str(record.fields.get("name", ""))
-        if record.kind not in ("points", "part", "branch", "analysis"):
+        kind, fields = record.kind, record.fields
+        # parts of a table are what it was taken from
+        if kind not in ("points", "part", "branch", "analysis") or fields.get("part", "").startswith("result"):
             continue
-        if record.kind == "part" and record.fields["part"].startswith("result"):
-            continue  # of a table
+        name = str(fields["name"])
         item = analyses.setdefault(name, Recovered(name))
-        if record.kind == "points":
-            if not record.fields["from"]:
+        if kind == "points":
+            if not fields["from"]:
                 item = analyses[name] = Recovered(name)
-            item.points += len(record.fields["omega"])
-            item.events += [(kind, omega, amplitude) for kind, omega, _, amplitude in record.fields["bifurcations"]]
+            item.points += len(fields["omega"])
+            item.events += [(kind, omega, amplitude) for kind, omega, _, amplitude in fields["bifurcations"]]
             item.bifurcations = len(item.events)
             continue
-        sizes, whole = record.dataset.sizes, record.kind == "analysis"
-        if whole:
-            item.state = "finished"
-            if record.dataset.attrs.get("contents") in ("diagram", "isolas"):
-                continue
-            item = analyses[name] = Recovered(name, "finished")
-        else:
+        sizes = record.dataset.sizes
+        if kind != "analysis":
             item.branches = (item.branches or 0) + 1
-        item.points += int(sizes.get("point", sizes.get("row", 0) if whole else 0))
+        elif record.dataset.attrs.get("contents") in ("diagram", "isolas"):
+            item.state = "finished"
+            continue
+        else:
+            item = analyses[name] = Recovered(name, "finished")
+        item.points += int(sizes.get("point", sizes.get("row", 0) if kind == "analysis" else 0))
         item.bifurcations += int(sizes.get("event", 0))
     return list(analyses.values())

@@ -20,7 +20,7 @@ def console(quiet: bool = False) -> Console:
     """Standard output, at most 80 columns wide; `quiet` prints nothing."""
     from rich.console import Console
 
-    return Console(highlight=False, width=min(WIDTH, Console().width), quiet=quiet)
+    return Console(highlight=False, markup=False, width=min(WIDTH, Console().width), quiet=quiet)
 
 
 def print_events(
@@ -42,7 +42,6 @@ def print_events(
 def print_texts(out: Console, names: Sequence[str], lines: Sequence[Sequence[str]], left: Sequence[str] = ()) -> None:
     """A table of texts, numbers to the right; where it is wider than the console its lines are, but nothing is cut."""
     from rich import box
-    from rich.markup import escape
     from rich.table import Table
 
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
@@ -50,7 +49,7 @@ def print_texts(out: Console, names: Sequence[str], lines: Sequence[Sequence[str
         last = name in left and name == names[-1]
         table.add_column(name, justify="left" if name in left else "right", no_wrap=not last, overflow="ellipsis")
     for line in lines:
-        table.add_row(*(escape(text) for text in line))
+        table.add_row(*line)
     own = out.width
     try:
         if names[-1] not in left:

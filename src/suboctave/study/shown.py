@@ -31,7 +31,7 @@ _LISTED = 40
 
 def print_result(out: Console, name: str, result: Result, note: str = "") -> None:
     """A branch, a diagram, isolas or a table, each in its way; `note`: how long it took."""
-    out.print(f"\n{name}", style="bold", markup=False, end="")
+    out.print(f"\n{name}", style="bold", end="")
     _print(result, out, note)
 
 
@@ -46,7 +46,7 @@ def _(branch: Branch, out: Console, note: str) -> None:
     values = branch.parameter(branch.name)
     ends = (min(values), max(values)) if branch.closed else (values[0], values[-1])
     span = f"{'closed, ' if branch.closed else ''}along {branch.name}, {ends[0]:.6g} to {ends[1]:.6g}"
-    out.print(f": {span}", markup=False)
+    out.print(f": {span}")
     dataset = branch_dataset(branch)
     lines = [list(line) for line in event_lines(dataset)]
     contacts = _contacts(branch)
@@ -58,10 +58,10 @@ def _(branch: Branch, out: Console, note: str) -> None:
             line[0] += f" {contacts[event.contact.element][0]}"
     print_events(out, lines, branch.name, [str(word) for word in dataset["event_criticality"].to_numpy()])
     for number, label in contacts.values() if len(contacts) > 1 else ():
-        out.print(f"grazing {number}: {label}", markup=False)
-    out.print(f"{len(branch)} points, {branch.verdicts}{note}; {branch.ended}.", markup=False)
+        out.print(f"grazing {number}: {label}")
+    out.print(f"{len(branch)} points, {branch.verdicts}{note}; {branch.ended}.")
     for warning in branch.warnings:
-        out.print(f"note: {warning}", markup=False)
+        out.print(f"note: {warning}")
 
 
 def _contacts(branch: Branch) -> dict[int, tuple[int, str]]:
@@ -74,25 +74,25 @@ def _contacts(branch: Branch) -> dict[int, tuple[int, str]]:
 def _(diagram: BifurcationDiagram, out: Console, note: str) -> None:
     """The tree of its branches, and their bifurcations as a table where these are not too many."""
     count = f"{len(diagram)} branch{'es' * (len(diagram) != 1)}"
-    out.print(f": along {diagram.root.branch.name}, {count}{note}\n", markup=False)
-    out.print(tree_text(diagram, out.width, head=False), markup=False, soft_wrap=True)
+    out.print(f": along {diagram.root.branch.name}, {count}{note}\n")
+    out.print(tree_text(diagram, out.width, head=False), soft_wrap=True)
     branches = [node for node in diagram if len(node.branch)]
     events = ((str(node.number), *line) for node in branches for line in event_lines(branch_dataset(node.branch)))
     lines = [line for line in events if line[1] not in CONTACT_KINDS]
     if len(lines) > _LISTED:
-        out.print(f"{len(lines)} bifurcations: --csv, or csv = true in [outputs], writes them all", markup=False)
+        out.print(f"{len(lines)} bifurcations: --csv, or csv = true in [outputs], writes them all")
     elif lines:
         names = ("branch", "kind", "omega", "max |x|", "multiplier", "residual")
         print_texts(out, names, lines, left=("kind",))
     for node in diagram:
         for warning in node.branch.warnings:
-            out.print(f"note on branch {node.number}: {warning}", markup=False)
+            out.print(f"note on branch {node.number}: {warning}")
 
 
 @_print.register(Isolas)
 def _(isolas: Isolas, out: Console, note: str) -> None:
     """The table of their ranges and ends, what happens at these in words, and what could not be settled."""
-    out.print(f": over {isolas.parameter}{note}\n{isolas.summary}", markup=False)
+    out.print(f": over {isolas.parameter}{note}\n{isolas.summary}")
     parameter = isolas.parameter
     heads = ("", "period", f"{parameter} from", "to", "born at", "omega", "merges at", "omega")
     keys = ("from", "to", "born", "born_omega", "merges", "merges_omega")
@@ -106,13 +106,13 @@ def _(isolas: Isolas, out: Console, note: str) -> None:
     for i, isola in enumerate(isolas):
         for end, reason in zip(("from", "to"), isola.reasons, strict=True):
             value = isola.range[end == "to"]
-            out.print(f"isola {i}, {parameter} = {value:.7g}: {reason}", markup=False)
+            out.print(f"isola {i}, {parameter} = {value:.7g}: {reason}")
         for value, branch in isola.known.items():
-            out.print(f"isola {i} at {parameter} = {value:.7g}: {_in_one_line(branch)}", markup=False)
+            out.print(f"isola {i} at {parameter} = {value:.7g}: {_in_one_line(branch)}")
         for text in isola.notes:
-            out.print(f"note on isola {i}: {text}", markup=False)
+            out.print(f"note on isola {i}: {text}")
     for text in isolas.notes:
-        out.print(f"note: {text}", markup=False)
+        out.print(f"note: {text}")
 
 
 def _in_one_line(branch: Branch) -> str:
@@ -128,7 +128,7 @@ def _in_one_line(branch: Branch) -> str:
 @_print.register(Table)
 def _(table: Table, out: Console, note: str) -> None:
     """The columns that fit, the longest texts below it."""
-    out.print(f": {table.title}{note}", markup=False)
+    out.print(f": {table.title}{note}")
     shown: dict[str, list[str]] = {}
     room = out.width
     for column in table.columns:
@@ -142,7 +142,7 @@ def _(table: Table, out: Console, note: str) -> None:
         print_texts(out, list(shown), list(zip(*shown.values(), strict=True)), left=kinds)
     left_out = [name for name in table.columns if name not in shown]
     if left_out:
-        out.print(f"not shown: {', '.join(left_out)} (--csv writes everything)", markup=False)
+        out.print(f"not shown: {', '.join(left_out)} (--csv writes everything)")
 
 
 def _number(value: Any) -> str:

@@ -201,7 +201,8 @@ def read_matrix(path: Path, key: str | None) -> Any:
     if suffix not in SUFFIXES:
         raise InputError(f"{path.name}: matrices are read from {', '.join(SUFFIXES)} files")
     if not path.is_file():
-        raise InputError(f"there is no file {path}{suggest(path.name, _beside(path)) if _beside(path) else ''}")
+        beside = [p.name for p in path.parent.glob("*") if p.suffix.lower() in SUFFIXES]
+        raise InputError(f"there is no file {path}{suggest(path.name, beside)}")
     try:
         matrix = _loaded(path, suffix, key)
     except InputError:
@@ -213,11 +214,6 @@ def read_matrix(path: Path, key: str | None) -> Any:
         if matrix.dtype.kind not in "fiu":
             raise InputError(f"{path}: the matrix holds {matrix.dtype}, not real numbers")
     return matrix
-
-
-def _beside(path: Path) -> list[str]:
-    folder = path.parent
-    return [p.name for p in folder.iterdir() if p.suffix.lower() in SUFFIXES] if folder.is_dir() else []
 
 
 def _loaded(path: Path, suffix: str, key: str | None) -> Any:

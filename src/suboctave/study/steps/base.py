@@ -1,8 +1,8 @@
 """What a step of a study is: one analysis with its arguments, as a table of the study file.
 
-A new kind of step is a class derived from `Step` in a file of this folder; it registers itself. The class names its
-`kind`, its verb and the arguments of that as fields, and says in `check` what is wrong before any work. Options of the
-verbs are tables as well: newton, stepping, harmonics, stability, formulation, seeds.
+A new kind of step is a class derived from `Step` in a file of this folder; it registers itself. The class is given its
+`kind` and its verb, has the arguments of that as fields, and says in `check` what is wrong before any work. Options of
+the verbs are tables as well: newton, stepping, harmonics, stability, formulation, seeds.
 """
 
 from __future__ import annotations
@@ -13,14 +13,7 @@ from functools import partial
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Field,
-    PrivateAttr,
-    model_serializer,
-    model_validator,
-)
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_serializer, model_validator
 
 from suboctave.analysis.diagram import Keeper
 from suboctave.analysis.subharmonics import Seeds
@@ -31,6 +24,7 @@ from suboctave.floquet.methods import METHODS, Arbitration, method_of
 from suboctave.harmonic.truncation import AdaptiveHarmonics
 from suboctave.kinds import KINDS
 from suboctave.maps.isolas.result import Isola, Isolas
+from suboctave.model.inputs import check_bounds, check_parameter, start_state
 from suboctave.model.system import System
 from suboctave.results.branch import Branch
 from suboctave.results.diagram import BifurcationDiagram
@@ -111,6 +105,17 @@ Complaint = tuple[Key, str]
 
 
 @dataclass(frozen=True)
+class Checked:
+    """In the type of a field: what refuses its value for a system, before any work."""
+
+    by: Callable[[System, Any], Any]
+
+
+#: displacements and velocities in which a trajectory begins
+State = Annotated[list[float] | None, Checked(start_state)]
+
+
+@dataclass(frozen=True)
 class Known:
     """What is known of the motions of an analysis before it runs: their free parameter, the values of the others."""
 
@@ -146,14 +151,17 @@ class Context:
 
 
 class Step(BaseModel):
-    """One analysis of a study. `parameters` are other values for this analysis alone, `seconds` is its time limit."""
+    """One analysis of a study. `parameters` are other values for this analysis alone, `seconds` is its time limit.
+
+    A class of steps is given its `kind`, the `verb`, what it `gives`, and fields that are no arguments of the verb
+    (`besides`).
+    """
 
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
 
     kind: ClassVar[str] = ""
     verb: ClassVar[Verb]
     gives: ClassVar[Gives] = "table"
-    #: fields that are no arguments of the verb
     besides: ClassVar[tuple[str, ...]] = ()
 
     name: str = Field(min_length=1)
@@ -161,11 +169,25 @@ class Step(BaseModel):
     parameters: dict[str, float] = Field(default_factory=dict)
     seconds: float | None = Field(default=None, gt=0.0)
 
-    @classmethod
-    def __pydantic_init_subclass__(cls, **more: Any) -> None:
-        super().__pydantic_init_subclass__(**more)
-        if cls.kind:
-            STEPS[cls.kind] = cls
+    def __init_subclass__(
+        cls,
+        kind: str = "",
+        verb: Verb | None = None,
+        gives: Gives | None = None,
+        besides: tuple[str, ...] = (),
+        **more: Any,
+    ) -> None:
+        super().__init_subclass__(**more)
+        cls.kind, cls.gives, cls.besides = kind, gives or cls.gives, besides or cls.besides
+        if verb is not None:
+            cls.verb = staticmethod(verb)
+        if kind:
+            STEPS[kind] = cls
+
+    @property
+    def varied(self) -> tuple[str, ...]:
+        """The parameters that vary in it."""
+        return ()
 
     @property
     def plane(self) -> tuple[str, str] | None:
@@ -195,6 +217,12 @@ class Step(BaseModel):
         """What is wrong with the arguments, before any work."""
         for place, curve in self.curves():
             yield from curve.check(place, around)
+        for name, given in type(self).model_fields.items():
+            for mark in given.metadata:
+                if isinstance(mark, Checked):
+                    yield from tried(name, partial(mark.by, around.system, getattr(self, name)))
+        for name in [name for name in self.varied if name in self.parameters]:
+            yield ("parameters", name), "is a parameter that varies: its range is in bounds"
 
     def known(self, around: CheckContext) -> Known | None:
         """What is known of its motions before it runs; None where that is nothing, or they are none."""
@@ -217,6 +245,14 @@ def tried(key: str, call: Callable[[], Any]) -> Iterator[Complaint]:
         call()
     except InputError as error:
         yield ((key,) if key else ()), str(error)
+
+
+def check_varied(
+    around: CheckContext, name: str, bounds: Any, keys: tuple[str, str] = ("parameter", "bounds")
+) -> Iterator[Complaint]:
+    """What is wrong with a parameter that varies, or else with its range."""
+    unknown = list(tried(keys[0], lambda: check_parameter(around.system, name)))
+    yield from unknown or tried(keys[1], lambda: check_bounds(around.system, name, bounds))
 
 
 # ------------------------------------------------------------------------------------------------- motions of a branch

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import partial
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationInfo, field_validator
 
@@ -20,19 +20,18 @@ from suboctave.continuation import Event
 from suboctave.errors import InputError, suggest
 from suboctave.kinds import KINDS, TRACKED_KINDS
 from suboctave.model.description import from_plain
-from suboctave.model.inputs import check_bounds, check_parameter, check_range, check_system
+from suboctave.model.inputs import check_bounds, check_range, check_system
 from suboctave.study.results import Result
 from suboctave.study.steps.base import (
     READERS,
     CheckContext,
     Complaint,
     Context,
-    Gives,
     Known,
     Motion,
     Range,
     Step,
-    Verb,
+    check_varied,
     tried,
 )
 
@@ -95,10 +94,8 @@ class FollowingStep(Step):
             yield ("harmonics",), f"with {around.system.n} DOFs that is too many unknowns: keep fewer harmonics"
 
 
-class CurveStep(FollowingStep):
+class CurveStep(FollowingStep, gives="branch"):
     """The arguments that `frequency_response` and `continue_branch` share."""
-
-    gives: ClassVar[Gives] = "branch"
 
     start: Start | None = None
     events: list[EventTable] = Field(default_factory=list)
@@ -144,7 +141,7 @@ class CurveStep(FollowingStep):
         source = self.inherited(around)
         for name, value in self.parameters.items():
             there = value if source is None else source.values.get(name, value)
-            if there != value:
+            if there != value and name not in self.varied:
                 yield ("parameters", name), f"the motion that it starts from has {name} = {there:g}: leave it out"
 
 
@@ -155,11 +152,8 @@ def check_sweep(omega: list[float], around: CheckContext) -> Iterator[Complaint]
     yield from tried("", lambda: check_system(around.system, () if wrong else tuple(omega)))
 
 
-class FrequencyResponse(CurveStep):
+class FrequencyResponse(CurveStep, kind="frequency_response", verb=frequency_response):
     """`so.frequency_response`; `start` may be a motion of an earlier branch, a state or coefficients."""
-
-    kind: ClassVar[str] = "frequency_response"
-    verb: ClassVar[Verb] = staticmethod(frequency_response)
 
     omega: Range
 
@@ -173,12 +167,8 @@ class FrequencyResponse(CurveStep):
         return super().computed(context, *first, **more)
 
 
-class Diagram(FrequencyResponse):
+class Diagram(FrequencyResponse, kind="bifurcation_diagram", verb=bifurcation_diagram, gives="diagram"):
     """`so.bifurcation_diagram`: a frequency response, and `depth` bifurcations deep what leaves it."""
-
-    kind: ClassVar[str] = "bifurcation_diagram"
-    verb: ClassVar[Verb] = staticmethod(bifurcation_diagram)
-    gives: ClassVar[Gives] = "diagram"
 
     depth: int = Field(default=2, ge=0)
     max_branches: int = Field(default=32, ge=1)
@@ -187,22 +177,20 @@ class Diagram(FrequencyResponse):
         return self.computed(context, keeper=context.keeper)
 
 
-class ContinueBranch(CurveStep):
+class ContinueBranch(CurveStep, kind="continue_branch", verb=continue_branch):
     """`so.continue_branch` from a motion of an earlier branch, or from the system with `omega`."""
-
-    kind: ClassVar[str] = "continue_branch"
-    verb: ClassVar[Verb] = staticmethod(continue_branch)
 
     parameter: str
     bounds: Range
     omega: float | None = None
 
+    @property
+    def varied(self) -> tuple[str, ...]:
+        return (self.parameter,)
+
     def check(self, around: CheckContext) -> Iterator[Complaint]:
         yield from super().check(around)
-        unknown = list(tried("parameter", lambda: check_parameter(around.system, self.parameter)))
-        yield from unknown
-        if not unknown:
-            yield from tried("bounds", lambda: check_bounds(around.system, self.parameter, self.bounds))
+        yield from check_varied(around, self.parameter, self.bounds)
         if self.start is not None and self.motion is None:
             yield ("start",), "name a motion of an earlier analysis, or leave it out and give omega"
         if self.start is None and self.parameter != "omega":
@@ -211,10 +199,7 @@ class ContinueBranch(CurveStep):
                 yield (), "needs start = {analysis = ...}, or omega, the frequency that is kept"
         if self.omega is not None and not self.omega > 0.0:
             yield ("omega",), f"must be positive, in rad per unit time, not {self.omega:g}"
-        if self.parameter in self.parameters:
-            yield ("parameters", self.parameter), "is the parameter that varies: its range is in bounds"
-        else:
-            yield from self.differing(around)
+        yield from self.differing(around)
 
     def known(self, around: CheckContext) -> Known | None:
         source = self.inherited(around)
@@ -227,11 +212,8 @@ class ContinueBranch(CurveStep):
         return self.computed(context, context.system if self.motion is None else self.started(context).orbit)
 
 
-class SwitchBranch(CurveStep):
+class SwitchBranch(CurveStep, kind="switch_branch", verb=switch_branch):
     """`so.switch_branch` at a bifurcation of an earlier branch; what is not given is as it was there."""
-
-    kind: ClassVar[str] = "switch_branch"
-    verb: ClassVar[Verb] = staticmethod(switch_branch)
 
     start: Motion
     side: Literal[1, -1] | None = None
@@ -266,11 +248,8 @@ class SwitchBranch(CurveStep):
 _EXTREMA = ("extremum", "isola_centre", "isola_merging")
 
 
-class Track(CurveStep):
+class Track(CurveStep, kind="track", verb=track):
     """`so.track`: `start` names a bifurcation of an earlier branch."""
-
-    kind: ClassVar[str] = "track"
-    verb: ClassVar[Verb] = staticmethod(track)
 
     parameter: str | list[str]
     bounds: Range | list[Range]
@@ -278,30 +257,28 @@ class Track(CurveStep):
     onto: str | dict[str, Any] | None = None
 
     @property
+    def varied(self) -> tuple[str, ...]:
+        return (self.parameter,) if isinstance(self.parameter, str) else tuple(self.parameter)
+
+    @property
     def plane(self) -> tuple[str, str] | None:
-        both = ["omega", self.parameter] if isinstance(self.parameter, str) else self.parameter
+        both = ("omega", *self.varied)[-2:]
         return (both[0], both[1]) if len(both) == 2 else None
 
     def check(self, around: CheckContext) -> Iterator[Complaint]:
         yield from super().check(around)
         yield from self._check_start()
-        names = [self.parameter] if isinstance(self.parameter, str) else self.parameter
         ranges = [self.bounds] if isinstance(self.parameter, str) else self.bounds
-        wrong = [c for name in names for c in tried("parameter", partial(check_parameter, around.system, name))]
-        yield from wrong
-        if not isinstance(self.parameter, str) and len(names) != 2:
+        if not isinstance(self.parameter, str) and len(self.parameter) != 2:
             yield ("parameter",), "is one name, beside omega, or two"
-        elif len(ranges) != len(names) or any(not isinstance(r, list) for r in ranges):
+        elif len(ranges) != len(self.varied) or any(not isinstance(r, list) for r in ranges):
             yield ("bounds",), "needs a range [from, to] for each parameter"
-        elif not wrong:
-            for name, ends in zip(names, ranges, strict=True):
-                mistaken = [*tried("bounds", partial(check_bounds, around.system, name, ends))]
+        else:
+            for name, ends in zip(self.varied, ranges, strict=True):
+                mistaken = list(check_varied(around, name, ends))
                 yield from mistaken or self._check_inside(around, name, ends)
         if self.omega is not None:
             yield from tried("omega", lambda: check_range("omega", self.omega, positive=True))
-        for name in names:
-            if name in self.parameters:
-                yield ("parameters", name), "is a parameter that varies: its range is in bounds"
         if self.events:
             yield ("events",), "is no option of a curve of bifurcations: leave it out"
 

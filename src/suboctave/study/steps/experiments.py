@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import partial
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
@@ -14,7 +14,7 @@ from pydantic import Field
 from suboctave.experiments.basins import Basins as BasinsResult, basins, check_plane
 from suboctave.experiments.lyapunov import lyapunov_exponents
 from suboctave.experiments.stepped_sine import check_stepped_sine, stepped_sine
-from suboctave.model.inputs import check_range, start_state
+from suboctave.model.inputs import check_range
 from suboctave.results.branch import TrackedBranch
 from suboctave.store.plain import padded
 from suboctave.store.table import Table
@@ -25,26 +25,22 @@ from suboctave.study.steps.base import (
     Curve,
     Motion,
     Range,
+    State,
     Step,
-    Verb,
     as_stability,
     tried,
 )
 from suboctave.verification.verify import stability, verify
 
 
-class Basins(Step):
+class Basins(Step, kind="basins", verb=basins, besides=("coordinates", "branches", "what")):
     """`so.basins`; `branches` are earlier ones whose stable motions at `omega` give the names, `what` the rows."""
-
-    kind: ClassVar[str] = "basins"
-    verb: ClassVar[Verb] = staticmethod(basins)
-    besides: ClassVar[tuple[str, ...]] = ("coordinates", "branches", "what")
 
     omega: float = Field(gt=0.0)
     box: list[Range] = Field(min_length=2, max_length=2)
     grid: list[int] = Field(default=[200, 200], min_length=2, max_length=2)
     coordinates: list[str] | None = None
-    rest: list[float] | None = None
+    rest: State = None
     branches: list[Curve] = Field(default_factory=list)
     periods: int = Field(default=500, ge=1)
     tolerance: float = Field(default=1e-8, ge=1e-15, le=1e-2)
@@ -58,7 +54,6 @@ class Basins(Step):
             yield ("grid",), "needs two positive numbers of states"
         system = around.system
         yield from tried("coordinates", lambda: check_plane(system, self.coordinates, system.observed_dof))
-        yield from tried("rest", lambda: start_state(system, self.rest))
 
     def run(self, context: Context) -> Table:
         attractors = {one.words: one.of(context.results) for one in self.branches}
@@ -77,14 +72,11 @@ def _states(result: BasinsResult) -> dict[str, np.ndarray]:
     return dict(zip((*result.plane, "motion", "settling"), columns, strict=True))
 
 
-class Lyapunov(Step):
+class Lyapunov(Step, kind="lyapunov_exponents", verb=lyapunov_exponents):
     """`so.lyapunov_exponents` from a `state`, default rest, at one frequency."""
 
-    kind: ClassVar[str] = "lyapunov_exponents"
-    verb: ClassVar[Verb] = staticmethod(lyapunov_exponents)
-
     omega: float = Field(gt=0.0)
-    state: list[float] | None = None
+    state: State = None
     periods: int = Field(default=1000, ge=1)
     transient: int = Field(default=300, ge=0)
     count: int | None = Field(default=None, ge=1)
@@ -92,7 +84,7 @@ class Lyapunov(Step):
     tolerance: float | None = Field(default=None, ge=1e-15, le=1e-2)
 
     def check(self, around: CheckContext) -> Iterator[Complaint]:
-        yield from tried("state", lambda: start_state(around.system, self.state))
+        yield from super().check(around)
         if self.count is not None and self.count > 2 * around.system.n:
             yield ("count",), f"is at most {2 * around.system.n}, two for each degree of freedom"
 
@@ -107,11 +99,8 @@ class Lyapunov(Step):
 Tap = Annotated[list[float], Field(min_length=3, max_length=3)]
 
 
-class SteppedSineStep(Step):
+class SteppedSineStep(Step, kind="stepped_sine", verb=stepped_sine):
     """`so.stepped_sine` over `omega` in `steps`; `state` and the rest as there."""
-
-    kind: ClassVar[str] = "stepped_sine"
-    verb: ClassVar[Verb] = staticmethod(stepped_sine)
 
     omega: Range
     steps: int = Field(default=200, ge=1)
@@ -153,10 +142,8 @@ class BranchStep(Step):
             yield ("parameters",), "its motions have the parameters that they were computed with: leave them out"
 
 
-class Verify(BranchStep):
+class Verify(BranchStep, kind="verify"):
     """`so.verify` on every `every`-th point, on the bifurcations, or on both; `tolerance` as there."""
-
-    kind: ClassVar[str] = "verify"
 
     what: Literal["points", "bifurcations", "both"] = "both"
     every: int = Field(default=10, ge=1)
@@ -194,10 +181,8 @@ def _row(
     return what, omega, check.distance, error, verdict, check.agrees, outcome, check.reason
 
 
-class Stability(BranchStep):
+class Stability(BranchStep, kind="stability"):
     """`so.stability` at `points` of `branch` and at its `bifurcations` of given kinds, by each of `methods`."""
-
-    kind: ClassVar[str] = "stability"
 
     points: list[int] | None = None
     bifurcations: list[str] = Field(default_factory=list)

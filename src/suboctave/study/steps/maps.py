@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, ClassVar
+from typing import Any
 
 from pydantic import Field
 
@@ -14,9 +14,8 @@ from suboctave.maps.isolas.result import Isolas
 from suboctave.maps.isolas.search import checked_levels, find_isolas
 from suboctave.maps.regimes.map import RegimeMap
 from suboctave.maps.regimes.verb import regime_map
-from suboctave.model.inputs import check_bounds, check_parameter
 from suboctave.store.table import Table
-from suboctave.study.steps.base import CheckContext, Complaint, Context, Gives, Range, Verb, tried
+from suboctave.study.steps.base import CheckContext, Complaint, Context, Range, check_varied, tried
 from suboctave.study.steps.curves import FollowingStep, check_sweep
 
 
@@ -28,11 +27,13 @@ class DesignStep(FollowingStep):
     bounds: Range
     max_curves: int = Field(default=64, ge=1)
 
+    @property
+    def varied(self) -> tuple[str, ...]:
+        return (self.parameter,)
+
     def check(self, around: CheckContext) -> Iterator[Complaint]:
         yield from super().check(around)
-        yield from check_design(self.parameter, self.bounds, ("parameter", "bounds"), around)
-        if self.parameter in self.parameters:
-            yield ("parameters", self.parameter), "is the parameter that varies: its range is in bounds"
+        yield from check_design(around, self.parameter, self.bounds)
         yield from check_sweep(self.omega, around)
 
     def _check_values(self, values: int | list[float]) -> Iterator[Complaint]:
@@ -40,23 +41,19 @@ class DesignStep(FollowingStep):
         yield from tried("values", lambda: checked_values("values", values, (low, high), least=2))
 
 
-def check_design(name: str, bounds: list[float], keys: tuple[str, str], around: CheckContext) -> Iterator[Complaint]:
+def check_design(
+    around: CheckContext, name: str, bounds: list[float], keys: tuple[str, str] = ("parameter", "bounds")
+) -> Iterator[Complaint]:
     """What is wrong with a design parameter and its bounds."""
     if name == "omega":
         hint = suggest("", around.system.parameters)
         yield (keys[0],), f"is the design parameter, beside omega: omega varies anyway{hint}"
-        return
-    unknown = list(tried(keys[0], lambda: check_parameter(around.system, name)))
-    yield from unknown or tried(keys[1], lambda: check_bounds(around.system, name, bounds))
+    else:
+        yield from check_varied(around, name, bounds, keys)
 
 
-class FindIsolas(DesignStep):
+class FindIsolas(DesignStep, kind="find_isolas", verb=find_isolas, gives="isolas", besides=("at",)):
     """`so.find_isolas`; `at` are values of the parameter at which the closed branches are followed and kept."""
-
-    kind: ClassVar[str] = "find_isolas"
-    verb: ClassVar[Verb] = staticmethod(find_isolas)
-    gives: ClassVar[Gives] = "isolas"
-    besides: ClassVar[tuple[str, ...]] = ("at",)
 
     values: int | list[float] = 5
     depth: int = Field(default=1, ge=0)
@@ -80,17 +77,14 @@ class FindIsolas(DesignStep):
         yield from tried("levels", lambda: checked_levels(self.levels))
 
     def run(self, context: Context) -> Isolas:
-        return self._with_branches(self.computed(context), context.progress)
-
-    def _with_branches(self, isolas: Isolas, progress: Any) -> Isolas:
-        """The closed branches at the values asked for are followed; what fails is noted."""
-        notes = []
+        isolas: Isolas = self.computed(context)
+        notes = []  # on closed branches at the values asked for
         for isola in isolas:
             for value in self.at:
                 if isolas.interrupted or value not in isola:
                     continue
                 try:
-                    branch = isola.at(value, progress=progress)
+                    branch = isola.at(value, progress=context.progress)
                 except ConvergenceError as failure:
                     notes.append(f"the closed branch at {self.parameter} = {value:g}: {failure}")
                     continue
@@ -103,12 +97,8 @@ class FindIsolas(DesignStep):
         return isolas.noting(notes)
 
 
-class IsolaRegions(DesignStep):
+class IsolaRegions(DesignStep, kind="isola_map", verb=find_isolas, besides=("second", "second_bounds", "probes")):
     """`so.find_isolas` over `parameter`, then `so.isola_map` over `second`, as a table (`IsolaMap.to_table`)."""
-
-    kind: ClassVar[str] = "isola_map"
-    verb: ClassVar[Verb] = staticmethod(find_isolas)
-    besides: ClassVar[tuple[str, ...]] = ("second", "second_bounds", "probes")
 
     second: str
     second_bounds: Range
@@ -118,7 +108,7 @@ class IsolaRegions(DesignStep):
 
     def check(self, around: CheckContext) -> Iterator[Complaint]:
         yield from super().check(around)
-        wrong = list(check_design(self.second, self.second_bounds, ("second", "second_bounds"), around))
+        wrong = list(check_design(around, self.second, self.second_bounds, ("second", "second_bounds")))
         yield from wrong
         if self.second == self.parameter:
             yield ("second",), f"must be another parameter than {self.parameter}"
@@ -139,12 +129,8 @@ class IsolaRegions(DesignStep):
         return _table_of(regions)
 
 
-class Regimes(DesignStep):
+class Regimes(DesignStep, kind="regime_map", verb=regime_map, besides=("check_points", "seed")):
     """`so.regime_map` as a table (`RegimeMap.to_table`); with `check` the title says what time integration found."""
-
-    kind: ClassVar[str] = "regime_map"
-    verb: ClassVar[Verb] = staticmethod(regime_map)
-    besides: ClassVar[tuple[str, ...]] = ("check_points", "seed")
 
     depth: int = Field(default=2, ge=0)
     values: int = Field(default=5, ge=1)
