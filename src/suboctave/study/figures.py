@@ -10,7 +10,7 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import AfterValidator, BeforeValidator, Field
 
 from suboctave.curves.junction import period_name
 from suboctave.errors import InputError, Key, chosen_dof, suggest
@@ -26,6 +26,7 @@ from suboctave.results.branch import Branch
 from suboctave.results.diagram import BifurcationDiagram
 from suboctave.results.readings import gapped_elements
 from suboctave.store.motions import motion_datasets
+from suboctave.study.mistakes import Section
 from suboctave.study.results import Result
 from suboctave.study.steps.base import CheckContext, Complaint, Motion, Step, tried
 
@@ -60,10 +61,8 @@ class StudyCurves:
         return {name: step.plane for name, step in self.steps.items() if step.gives != "table"}
 
 
-class Figure(BaseModel):
+class Figure(Section):
     """One figure; its form follows the suffix of `file`. A class of figures is given its `kind` and what draws it."""
-
-    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
     plot: ClassVar[Callable[..., Any]]
 

@@ -12,12 +12,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from suboctave.errors import Key, path_of, suggest
 from suboctave.model.system import System, describe
 from suboctave.study.figures import FIGURES, Figure, StudyCurves
-from suboctave.study.mistakes import Lines, Mistake, Mistakes, StudyError
+from suboctave.study.mistakes import Lines, Mistake, Mistakes, Section, StudyError
 from suboctave.study.outputs import Outputs, check_outputs
 from suboctave.study.steps import STEPS, CheckContext, Known, Step
 from suboctave.study.system import SystemSection, make_system, overridden
@@ -29,10 +29,8 @@ _LONGEST = 5_000_000
 _LONGEST_NAME = 60
 
 
-class StudyFile(BaseModel):
+class StudyFile(Section):
     """The sections of a study file; analyses are read one by one, each as the step that it is."""
-
-    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
     title: str = ""
     seconds: float | None = Field(default=None, gt=0.0)

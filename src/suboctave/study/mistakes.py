@@ -12,12 +12,17 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, get_args
+from typing import Any, get_args
+
+import pydantic
 
 from suboctave.errors import InputError, Key, suggest
 
-if TYPE_CHECKING:
-    import pydantic
+
+class Section(pydantic.BaseModel):
+    """A table of a study file: no key but its own, each of its type."""
+
+    model_config = pydantic.ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path, PurePath
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from suboctave.atomic import free_place
 from suboctave.errors import InputError, Key
@@ -17,6 +17,7 @@ from suboctave.pictures.paper import SUFFIXES
 from suboctave.results.diagram import BifurcationDiagram
 from suboctave.store.table import Table
 from suboctave.study.figures import StudyCurves, drawable
+from suboctave.study.mistakes import Section
 from suboctave.study.results import Result, Results
 from suboctave.study.steps import Step
 from suboctave.study.steps.base import Complaint, Gives
@@ -25,10 +26,8 @@ from suboctave.study.steps.base import Complaint, Gives
 _LONGEST = 200
 
 
-class Outputs(BaseModel):
+class Outputs(Section):
     """What is written into `folder` (default: the study's name with _results, beside the study file)."""
-
-    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
     folder: str | None = Field(default=None, min_length=1)
     results: str = "results.nc"

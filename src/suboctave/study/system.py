@@ -12,23 +12,21 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from suboctave.errors import InputError, Key, suggest
 from suboctave.model import library
 from suboctave.model.description import build_part
 from suboctave.model.matrices import matrix_coefficient
 from suboctave.model.system import System
-from suboctave.study.mistakes import Mistakes
+from suboctave.study.mistakes import Mistakes, Section
 
 MATRICES = ("mass", "damping", "stiffness")
 SUFFIXES = (".npy", ".npz", ".mtx", ".mat", ".csv")
 
 
-class SystemSection(BaseModel):
+class SystemSection(Section):
     """What vibrates: matrices with elements and loads, equations as text, or a published system."""
-
-    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
     name: str = ""
     library: str | None = None

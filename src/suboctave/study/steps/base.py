@@ -13,7 +13,7 @@ from functools import partial
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_serializer, model_validator
+from pydantic import Field, PrivateAttr, model_serializer, model_validator
 
 from suboctave.analysis.diagram import Keeper
 from suboctave.analysis.subharmonics import Seeds
@@ -28,6 +28,7 @@ from suboctave.model.inputs import check_bounds, check_parameter, start_state
 from suboctave.model.system import System
 from suboctave.results.branch import Branch
 from suboctave.results.diagram import BifurcationDiagram
+from suboctave.study.mistakes import Section
 from suboctave.study.results import Result
 
 
@@ -150,14 +151,12 @@ class Context:
     keeper: Keeper | None = None
 
 
-class Step(BaseModel):
+class Step(Section):
     """One analysis of a study. `parameters` are other values for this analysis alone, `seconds` is its time limit.
 
     A class of steps is given its `kind`, the `verb`, what it `gives`, and fields that are no arguments of the verb
     (`besides`).
     """
-
-    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
 
     kind: ClassVar[str] = ""
     verb: ClassVar[Verb]
@@ -256,14 +255,12 @@ def check_varied(
 
 
 # ------------------------------------------------------------------------------------------------- motions of a branch
-class Curve(BaseModel):
+class Curve(Section):
     """A branch of an earlier analysis; the name of that alone stands for a table with no more in it.
 
     Of a diagram one of its branches, by number or by how its label begins; of isolas the curve of limit points of one
     of them, or with `at`, a value of the parameter, its closed branch there.
     """
-
-    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
 
     analysis: str
     branch: int | None = Field(default=None, ge=0)

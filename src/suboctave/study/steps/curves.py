@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from functools import partial
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationInfo, field_validator
+from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator
 
 from suboctave.analysis.branches import check_left, continue_branch, frequency_response, switch_branch
 from suboctave.analysis.diagram import bifurcation_diagram
@@ -21,6 +21,7 @@ from suboctave.errors import InputError, suggest
 from suboctave.kinds import KINDS, TRACKED_KINDS
 from suboctave.model.description import from_plain
 from suboctave.model.inputs import check_bounds, check_range, check_system
+from suboctave.study.mistakes import Section
 from suboctave.study.results import Result
 from suboctave.study.steps.base import (
     READERS,
@@ -36,10 +37,8 @@ from suboctave.study.steps.base import (
 )
 
 
-class EventTable(BaseModel):
+class EventTable(Section):
     """A user's event: the zero of a Python function of the motion, "module:function"."""
-
-    model_config = ConfigDict(extra="forbid", strict=True)
 
     name: str
     function: str
