@@ -17,7 +17,7 @@ import numpy as np
 
 from suboctave.errors import InputError
 from suboctave.model.description import plain_number
-from suboctave.model.system import System, describe
+from suboctave.model.system import System, build, describe
 
 if TYPE_CHECKING:
     import xarray
@@ -120,9 +120,9 @@ def padded(rows: Sequence[Any], kind: type) -> np.ndarray:
 
 # ---------------------------------------------------------------------------------- datasets with a record and systems
 def written_system(system: System) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-    """A system as plain data, and its large arrays as variables of a file."""
+    """A system as plain data, and its large arrays."""
     arrays: dict[str, np.ndarray] = {}
-    return describe(system, arrays), {f"system_{name}": array for name, array in arrays.items()}
+    return describe(system, arrays), arrays
 
 
 def system_arrays(dataset: xarray.Dataset) -> dict[str, np.ndarray]:
@@ -155,3 +155,23 @@ def recorded(
     coordinates = [name for name in dataset.coords if name not in (variables or ())]
     stored = xarray.Dataset(dict(flat(every)), attrs=dataset.attrs)
     return stored.set_coords([name for name in coordinates if name in stored])
+
+
+class Recorded:
+    """A dataset that `recorded` wrote: its `record`, its arrays by name, and the systems in it."""
+
+    def __init__(self, dataset: xarray.Dataset, allow_code: bool, classes: Mapping[str, type] | None = None) -> None:
+        self.dataset = dataset
+        self.record: dict[str, Any] = from_json(str(dataset["record"].item()), classes)
+        self._allow_code = allow_code
+        self._arrays: dict[str, np.ndarray] = {}
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """A variable, complex where it was; each put together once."""
+        if name not in self._arrays:
+            self._arrays[name] = array_of(self.dataset, name)
+        return self._arrays[name]
+
+    def system(self, described: Mapping[str, Any]) -> System:
+        """A system of the record."""
+        return build(described, system_arrays(self.dataset), self._allow_code)
