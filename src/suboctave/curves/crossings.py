@@ -49,28 +49,17 @@ def first_doubtful(places: Sequence[float], tests: Sequence[Array], at: int) -> 
 
 
 @kernel()
-def _first_doubtful(places, tests, at):
-    """`first_doubtful` of tests (N, 2, m): which function, and the share, which is -1 where none is in doubt."""
-    n, functions = places.shape[0], tests.shape[2]
-    values = np.empty(n)
-    for k in range(functions):
-        # in units of the largest: products of many factors leave the range of numbers
-        largest = tests[0, 1, k]
-        for i in range(1, n):
-            largest = max(largest, tests[i, 1, k])
-        for i in range(n):
-            values[i] = tests[i, 0, k] * np.exp(tests[i, 1, k] - largest)
-        # one that is nothing all along says nothing
-        share = -1.0 if np.isnan(values[0]) else _doubtful(places, values, at)
-        if share >= 0.0:
-            return k, share
-    return functions, -1.0
-
-
-@kernel()
-def _differences(places, values, at):
-    """The cubic by `bent`, `third` and `shift`, and the third differences that foretell it from before and behind."""
+def _interpolated(places, tests, at, k, values):
+    """Function k in units of its largest value into `values`; its cubic off the chord by `bent`, `third` and `shift`,
+    and the third differences that foretell it from before and behind.
+    """
     p, q, n = places[at], places[at + 1], places.shape[0]
+    # products of many factors leave the range of numbers
+    largest = tests[0, 1, k]
+    for i in range(1, n):
+        largest = max(largest, tests[i, 1, k])
+    for i in range(n):
+        values[i] = tests[i, 0, k] * np.exp(tests[i, 1, k] - largest)
     chord = (values[at + 1] - values[at]) / (q - p)
     # f[p, q, x] for the places beside
     second = np.empty(n)
@@ -95,83 +84,77 @@ def _differences(places, values, at):
             elif count == 1:
                 third = (second[i] - bent) / (places[i] - shift)
             count += 1
-    return bent, third, shift, before, behind
+    return chord, bent, third, shift, before, behind
 
 
 @kernel()
-def _doubtful(places, values, at):
-    """The share at which a zero of one function may hide, -1 for nowhere."""
+def _first_doubtful(places, tests, at):
+    """`first_doubtful` of tests (N, 2, m): which function, and the share, which is -1 where none is in doubt."""
     p, q = places[at], places[at + 1]
-    fp, fq = values[at], values[at + 1]
-    h = q - p
-    chord = (fq - fp) / h
-    bent, third, shift, before, behind = _differences(places, values, at)
-    low, high = max(0, at - 2), min(places.shape[0], at + 4)
-    same = (fp > 0.0) == (fq > 0.0)
-    if same:
-        # all that may come off the chord against its lower end
-        bend = 0.25 * h * h * (abs(bent) + abs(third) * max(abs(shift - p), abs(shift - q)))
-        ahead, back = before, behind
-        for i in range(low, at):
-            ahead *= abs(q - places[i])
-        for i in range(at + 2, high):
-            back *= abs(p - places[i])
-        if min(abs(fp), abs(fq)) > bend + SAFETY * h * max(ahead, back):
-            return -1.0
-    sign = 1.0 if fp > 0.0 else -1.0
-    # the grid, and in their places where the cubic off the chord is extreme: its derivative is a s^2 + b s + c
-    shares = np.empty(_GRID.shape[0] + 2)
-    looks = _GRID.shape[0]
-    for k in range(looks):
-        shares[k] = _GRID[k]
-    a, b, c = 3.0 * third, 2.0 * (bent - third * (shift - p + h)), chord - bent * h + third * (shift - p) * h
-    inside = b * b - 4.0 * a * c
-    if inside >= 0.0:
-        q_root = -0.5 * (b + math.copysign(math.sqrt(inside), b))
-        for over, under in ((q_root, a), (c, q_root)):
-            if under != 0.0 and 0.0 < over / under < h:
-                share, k = over / (under * h), looks
-                while k > 0 and shares[k - 1] > share:
-                    shares[k] = shares[k - 1]
-                    k -= 1
-                shares[k] = share
-                looks += 1
-    value = np.empty(looks)
-    doubt = np.empty(looks)
-    for k in range(looks):
-        ahead, back = shares[k] * h, (1.0 - shares[k]) * h
-        s = p + ahead
-        value[k] = sign * (fp + ahead * chord - ahead * back * (bent + third * (s - shift)))
-        ahead, back = ahead * before, back * behind
-        for i in range(low, at):
-            ahead *= abs(s - places[i])
-        for i in range(at + 2, high):
-            back *= abs(s - places[i])
-        doubt[k] = SAFETY * max(ahead, back)
-    # one zero between places of opposite sign: where the cubic says, and nowhere else
-    root = 1.0
-    if not same:
-        last, value_last = 0.0, sign * fp
+    h, low, high = q - p, max(0, at - 2), min(places.shape[0], at + 4)
+    values, grid = np.empty(places.shape[0]), _GRID.shape[0]
+    shares, value, doubt = np.empty(grid + 2), np.empty(grid + 2), np.empty(grid + 2)
+    for function in range(tests.shape[2]):
+        chord, bent, third, shift, before, behind = _interpolated(places, tests, at, function, values)
+        # one that is nothing all along says nothing
+        if np.isnan(values[0]):
+            continue
+        fp, fq = values[at], values[at + 1]
+        same = (fp > 0.0) == (fq > 0.0)
+        if same:
+            # all that may come off the chord against its lower end
+            bend = 0.25 * h * h * (abs(bent) + abs(third) * max(abs(shift - p), abs(shift - q)))
+            ahead, back = before, behind
+            for i in range(low, at):
+                ahead *= abs(q - places[i])
+            for i in range(at + 2, high):
+                back *= abs(p - places[i])
+            if min(abs(fp), abs(fq)) > bend + SAFETY * h * max(ahead, back):
+                continue
+        sign = 1.0 if fp > 0.0 else -1.0
+        # the grid, and in their places where the cubic off the chord is extreme: its derivative is a s^2 + b s + c
+        looks = grid
+        shares[:grid] = _GRID
+        a, b, c = 3.0 * third, 2.0 * (bent - third * (shift - p + h)), chord - bent * h + third * (shift - p) * h
+        inside = b * b - 4.0 * a * c
+        if inside >= 0.0:
+            q_root = -0.5 * (b + math.copysign(math.sqrt(inside), b))
+            for over, under in ((q_root, a), (c, q_root)):
+                if under != 0.0 and 0.0 < over / under < h:
+                    share, k = over / (under * h), looks
+                    while k > 0 and shares[k - 1] > share:
+                        shares[k] = shares[k - 1]
+                        k -= 1
+                    shares[k] = share
+                    looks += 1
+        # one zero between places of opposite sign: where the cubic says, and nowhere else
+        root, last, value_last = 1.0, 0.0, sign * fp
         for k in range(looks + 1):
-            share = shares[k] if k < looks else 1.0
-            here = value[k] if k < looks else sign * fq
-            if here <= 0.0:
+            share, here = 1.0, sign * fq
+            if k < looks:
+                share = shares[k]
+                ahead, back = share * h, (1.0 - share) * h
+                s = p + ahead
+                here = value[k] = sign * (fp + ahead * chord - ahead * back * (bent + third * (s - shift)))
+                ahead, back = ahead * before, back * behind
+                for i in range(low, at):
+                    ahead *= abs(s - places[i])
+                for i in range(at + 2, high):
+                    back *= abs(s - places[i])
+                doubt[k] = SAFETY * max(ahead, back)
+            if not same and here <= 0.0 and root == 1.0:
                 part = value_last / (value_last - here) if value_last > here else 0.5
                 root = last + (share - last) * part
-                break
             last, value_last = share, here
-    margin, where = np.inf, -1.0
-    for k in range(looks):
-        if same:
-            left_over = value[k] - doubt[k]
-        else:
-            left_over = value[k] if shares[k] < root else -value[k]
-            left_over -= 0.25 * doubt[k] * min(1.0, 4.0 * abs(shares[k] - root))
-        if left_over < margin:
-            margin, where = left_over, shares[k]
-    if margin < 0.0 or (same and margin == 0.0):
-        return where
-    return -1.0
-
-
-__all__ = ["SAFETY", "first_doubtful"]
+        margin, where = np.inf, -1.0
+        for k in range(looks):
+            if same:
+                left_over = value[k] - doubt[k]
+            else:
+                left_over = value[k] if shares[k] < root else -value[k]
+                left_over -= 0.25 * doubt[k] * min(1.0, 4.0 * abs(shares[k] - root))
+            if left_over < margin:
+                margin, where = left_over, shares[k]
+        if margin < 0.0 or (same and margin == 0.0):
+            return function, where
+    return tests.shape[2], -1.0

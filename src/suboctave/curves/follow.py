@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from bisect import insort
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from suboctave.continuation.ending import Ending, EndReason
 from suboctave.continuation.events import Bracket
 from suboctave.continuation.march import Arrival
 from suboctave.continuation.point import point_between, solved_again
+from suboctave.curves.audit import joined
 from suboctave.curves.count import CountCheck
 from suboctave.curves.doublings import DoublingWatch
 from suboctave.curves.driver import Driver, same_event
@@ -21,7 +23,7 @@ from suboctave.curves.events.finder import Located, locate, locate_near
 from suboctave.curves.events.grazings import locate_grazings, touches
 from suboctave.curves.events.layer import behind_their_grazings
 from suboctave.curves.events.monitors import BRANCH_POINT, PERIOD_DOUBLING, BifurcationKind, changes, solved_by
-from suboctave.curves.guard import Crossing, Passage, StepGuard
+from suboctave.curves.guard import Crossing, GuardedStep, StepGuard
 from suboctave.curves.hidden import REASON, HiddenDoublings, pair_in
 from suboctave.curves.junction import UNSEEN, Meeting, meeting
 from suboctave.curves.motion import MotionProblem
@@ -49,7 +51,8 @@ class _Follower(Driver):
         self.march = March(start, direction, bounds, settings.newton, settings.stepping, self._clear, self._arrived)
         self._candidate: Sample | None = None
         self._guard = StepGuard(self._between, self._crossing)
-        self._crossings: list[Crossing] = []
+        #: the step that is searched
+        self._step: GuardedStep | None = None
         self._again: tuple[Sample, MotionProblem, Sample] | None = None
         self._count = CountCheck()
         self._hidden = HiddenDoublings()
@@ -90,7 +93,8 @@ class _Follower(Driver):
     def _finish(self) -> None:
         for p, q, reason in self._watch.missed() if self._watch is not None else ():
             self._guard.doubt(p, q, reason)
-        self.trace.audit = self._guard.audit
+        audit = self._guard.audit
+        self.trace.audit = replace(audit, unsettled=tuple(joined(audit.unsettled)))
         if self._turned is not None and self.settings.half:
             self.trace.end_at(self._turned)
 
@@ -151,7 +155,8 @@ class _Follower(Driver):
 
     def _crossing(self, a: Sample, b: Sample) -> Crossing | None:
         """The branch point between two samples of different orientation, if its system can be solved."""
-        known = next((crossing for crossing in self._crossings if crossing.between(a, b)), None)
+        crossings = self._step.crossings if self._step is not None else []
+        known = next((crossing for crossing in crossings if crossing.between(a, b)), None)
         if known is not None:
             return known
         located = self._located(BRANCH_POINT, a, b)
@@ -165,7 +170,7 @@ class _Follower(Driver):
 
     def _accept(self, point: CurvePoint) -> None:
         sample = self._sample(point)
-        passed, passage = [sample], None
+        passed = [sample]
         if self.previous is not None:
             if self.previous.at_rest or sample.at_rest:
                 self._guard.forget()
@@ -177,16 +182,16 @@ class _Follower(Driver):
                 if again is not self.previous:
                     self._search_here(self.previous, again)
                     self.previous = again
-                passage = self._guard.passage(again, sample)
-                passed, self._crossings = passage.samples, passage.crossings
+                self._step = self._guard.passage(again, sample)
+                passed = self._step.separating
         for new in passed:
             if self.previous is not None:
                 self._search(self.previous, new)
             self.trace.points.append(new.as_point(new.verdict))
             self.previous = new
-        self._crossings = []
-        if passage is not None:
-            self._look_behind(passage)
+        step, self._step = self._step, None
+        if step is not None:
+            self._look_behind(step.inside)
         self._report(point)
         if self._keeper is not None:
             self._keeper(self.trace)
@@ -198,9 +203,9 @@ class _Follower(Driver):
             self.trace.doubts += [Doubt(item.orbit, text) for text in sentences]
         return item
 
-    def _look_behind(self, passage: Passage) -> None:
+    def _look_behind(self, inside: list[Sample]) -> None:
         """What the harmonics solved for do not show of a step: hidden pairs, and open verdicts between its points."""
-        for stretch in self._hidden.passed(passage.inside):
+        for stretch in self._hidden.passed(inside):
             pairs = [] if self._watch else pair_in(stretch, self.settings.newton)
             items = [item for entry in pairs if (item := self._bifurcation(*entry)) is not None]
             for item in items:
@@ -208,7 +213,7 @@ class _Follower(Driver):
                     self._count.noted(item)
             if len(items) < 2:
                 self._guard.doubt(stretch.before, stretch.behind, REASON)
-        self.trace.open += [s.as_point(s.floquet) for s in passage.inside[1:-1] if not s.floquet.decided]
+        self.trace.open += [s.as_point(s.floquet) for s in inside[1:-1] if not s.floquet.decided]
 
     def _search_here(self, old: Sample, again: Sample) -> None:
         """Events that lie behind a point in one discretisation and before it in the next."""
@@ -244,7 +249,10 @@ class _Follower(Driver):
                 self._turned = turned
                 continue
             crossing = self._crossing(a, b) if kind is BRANCH_POINT else None
-            located = crossing.within(a, b) if crossing is not None else self._located(kind, a, b)
+            if crossing is None:
+                located = self._located(kind, a, b)
+            else:
+                located = replace(crossing.located, fraction=(crossing.place - a.place) / (b.place - a.place))
             item = None if located is None else self._bifurcation(located, a, b)
             if located is None or item is None:
                 # several real multipliers may pass for a pair: the count tells
@@ -252,7 +260,7 @@ class _Follower(Driver):
                     missing.append(kind.name)
                 continue
             events.append((located.fraction, item))
-            if crossing is not None and crossing.turns:
+            if crossing is not None and crossing.turned is not None:
                 # at a pitchfork the bifurcating branch turns back exactly at the branch point
                 turned = item
         if "BP" in missing and "LP" in missing:

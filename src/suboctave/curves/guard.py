@@ -18,19 +18,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
-
-import numpy as np
 
 from suboctave.continuation.linear import length
 from suboctave.continuation.point import CurvePoint, between
 from suboctave.continuation.problem import Array
-from suboctave.curves.audit import Audit, Unsettled, joined
+from suboctave.curves.audit import Audit
 from suboctave.curves.events.finder import Located
 from suboctave.curves.events.monitors import BRANCH_POINT, NEIMARK_SACKER, changes
-from suboctave.curves.interior import FINEST, Contacts, Interior, unsettled
-from suboctave.curves.nearing import GRAZES
+from suboctave.curves.interior import FINEST, Interior, Steps, unsettled
 from suboctave.curves.sample import Sample
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.basis import ComplexArray
@@ -61,33 +58,12 @@ class Crossing:
     located: Located
     turned: float | None
 
-    @property
-    def turns(self) -> bool:
-        """Whether the curve turns back in its parameter exactly there."""
-        return self.turned is not None
-
     def between(self, a: Sample, b: Sample) -> bool:
         """Whether it lies between two samples."""
         return a.place <= self.place <= b.place
 
-    def within(self, a: Sample, b: Sample) -> Located:
-        """It as located between two samples."""
-        return replace(self.located, fraction=(self.place - a.place) / (b.place - a.place))
 
-
-@dataclass
-class Passage:
-    """An examined step: the samples that separate its events, its end included, all that were looked at, both ends
-    included, the branch points between them, and what stayed in doubt.
-    """
-
-    samples: list[Sample]
-    inside: list[Sample]
-    crossings: list[Crossing]
-    unsettled: list[Unsettled] = field(default_factory=list)
-
-
-class StepGuard:
+class StepGuard(Steps):
     """Examines the steps along one curve.
 
     Parameters
@@ -104,92 +80,85 @@ class StepGuard:
         solve: Callable[[Sample, Sample, float, bool], Sample],
         branch_point: Callable[[Sample, Sample], Crossing | None],
     ) -> None:
-        self._solve = solve
-        self._branch_point = branch_point
-        self._behind: list[Sample] = []
+        super().__init__()
+        self.solve = solve
+        self.branch_point = branch_point
         #: the branch point behind at which the curve has turned back, while tests still reach back to it
-        self._turned: Crossing | None = None
-        self._probes = self._refused = 0
-        self._finest, self._longest = np.inf, 0.0
-        self._unsettled: list[Unsettled] = []
-        self._last: tuple[Sample, Sample, _Step] | None = None
-        self._contacts = Contacts()
-
-    @property
-    def audit(self) -> Audit:
-        """What was examined so far."""
-        return Audit(self._finest, self._longest, self._probes, self._refused, tuple(joined(self._unsettled)))
+        self.turned: Crossing | None = None
+        self.audit = Audit()
+        self._last: GuardedStep | None = None
 
     def refuses(self, old: Sample, new: Sample) -> bool:
         """True if a step has left its curve, or hides more than can be told while it is that long."""
         step = self._examined(old, new)
         if step.refused:
-            self._refused += 1
+            self.audit = replace(self.audit, refused=self.audit.refused + 1)
         return step.refused
 
-    def passage(self, old: Sample, new: Sample) -> Passage:
-        """What lies on the way between two neighbours, the step being accepted."""
-        step = self._examined(old, new)
-        self._probes += step.probes
-        self._unsettled += step.unsettled
-        self._turned = step.turned
-        if self._turned is not None:
+    def passage(self, old: Sample, new: Sample) -> GuardedStep:
+        """The way between two neighbours, looked at, the step being accepted."""
+        step, audit = self._examined(old, new), self.audit
+        known, self.turned = [*audit.unsettled, *step.unsettled], step.turned
+        if self.turned is not None:
             # known now, it explains what was in doubt right before it
-            nearest = self._turned.place - _EXAMINED
-            self._unsettled = [u for u in self._unsettled if u.reason != _RETURNS or u.arclength[0] < nearest]
-        for interval in step.settled:
-            self._finest, self._longest = min(self._finest, interval), max(self._longest, interval)
-        self._behind = step.samples[-4:]
-        self._contacts.keep(self._behind)
-        inside = step.inside
-        return Passage(_separating(inside), inside, step.crossings, step.unsettled)
+            nearest = self.turned.place - _EXAMINED
+            known = [u for u in known if u.reason != _RETURNS or u.arclength[0] < nearest]
+        finest, longest = (
+            chosen([found, *step.settled]) for chosen, found in ((min, audit.finest), (max, audit.longest))
+        )
+        self.audit = Audit(finest, longest, audit.probes + step.probes, audit.refused, tuple(known))
+        self.keep(step.samples)
+        return step
 
     def doubt(self, old: Sample, new: Sample, reason: str) -> None:
         """Something between two samples could not be settled."""
-        self._unsettled.append(unsettled(old, new, reason))
-
-    def grazes(self, p: Sample, q: Sample) -> bool:
-        """Whether a contact begins or ceases to touch between two samples."""
-        return self._contacts.between(p, q) == GRAZES
+        self.audit = replace(self.audit, unsettled=(*self.audit.unsettled, unsettled(old, new, reason)))
 
     def forget(self) -> None:
-        """What lies behind says nothing of what comes (a corner of the equations)."""
-        self._behind = []
-        self._turned = None
+        super().forget()
+        self.turned = None
 
-    def _examined(self, old: Sample, new: Sample) -> _Step:
-        if self._last is None or self._last[0] is not old or self._last[1] is not new:
-            # the last one may have been solved again with other harmonics
-            behind = [s for s in self._behind if s.place < old.place]
-            behind.append(old)
-            turned = self._turned if self._turned and behind[0].place < self._turned.place else None
-            self._last = (old, new, _Step(behind, new, self._solve, self._branch_point, self._contacts, turned))
-        return self._last[2]
+    def _examined(self, old: Sample, new: Sample) -> GuardedStep:
+        if self._last is None or self._last.old is not old or self._last.new is not new:
+            self._last = GuardedStep(self, old, new)
+        return self._last
 
 
-class _Step(Interior):
+class GuardedStep(Interior):
     """One step along a response under examination."""
 
-    def __init__(
-        self,
-        behind: list[Sample],
-        new: Sample,
-        solve: Callable[[Sample, Sample, float, bool], Sample],
-        branch_point: Callable[[Sample, Sample], Crossing | None],
-        contacts: Contacts,
-        turned: Crossing | None = None,
-    ) -> None:
-        super().__init__(behind, new, contacts.between, _REASONS)
-        self.solve = solve
-        self.branch_point = branch_point
+    steps: StepGuard
+
+    def __init__(self, guard: StepGuard, old: Sample, new: Sample) -> None:
+        super().__init__(guard, old, new, _REASONS)
+        #: the branch points in it, and that within reach at which the curve has turned back
         self.crossings: list[Crossing] = []
-        self.turned = turned
-        pending = [(self.old, new)]
+        self.turned = guard.turned if guard.turned and guard.leading_to(old)[0].place < guard.turned.place else None
+        pending = [(old, new)]
         if self.size > _JUMP:
-            self._look_for_crossing(self.old, new)
-            if not self.refused and self.size > FINEST and _disagreement(self.old.point, new.point) > _AGREE:
-                pending = self.cut(self.old, new, 0.5)
+            self._look_for_crossing(old, new)
+            if not self.refused and self.size > FINEST and _disagreement(old.point, new.point) > _AGREE:
+                pending = self.cut(old, new, 0.5)
         self.examine(pending)
+
+    @property
+    def separating(self) -> list[Sample]:
+        """The fewest of the samples inside (the first left out, the last kept) between which no test changes twice, and
+        every change that lies between is seen: two real multipliers that meet and cross the circle as a pair are a pair
+        only from close by.
+
+        A pair that crosses the circle is seen in the count of unstable multipliers: it wants an interval of its own.
+        """
+        first, *_, last = samples = self.inside
+        kept, since = [first], set[str]()
+        for p, q in pairwise(samples) if len(samples) > 2 else ():
+            now = {kind.name for kind in changes(p, q)}
+            crowded = now & since or (now and since and "NS" in now | since)
+            if p is not kept[-1] and (crowded or {kind.name for kind in changes(kept[-1], q)} != now | since):
+                kept.append(p)
+                since = set()
+            since |= now
+        return [*kept[1:], last]
 
     def harmless(self, p: Sample, q: Sample, reason: str) -> bool:
         # no event, but too close to one to tell it from two; open verdicts are stated as such
@@ -206,7 +175,7 @@ class _Step(Interior):
     def solved(self, fraction: float) -> Sample | None:
         a, b = self.old.point, self.new.point
         try:
-            sample = self.solve(self.old, self.new, fraction, bool(self.crossings or self.turned))
+            sample = self.steps.solve(self.old, self.new, fraction, bool(self.crossings or self.turned))
         except ConvergenceError:
             self.refused = self.size > _JUMP
             return None
@@ -244,7 +213,7 @@ class _Step(Interior):
             return None
         known = next((crossing for crossing in self.crossings if crossing.between(p, q)), None)
         if known is None:
-            known = self.branch_point(p, q)
+            known = self.steps.branch_point(p, q)
             if known is not None:
                 self.crossings.append(known)
                 self.turned = known if known.turned is not None else self.turned
@@ -281,27 +250,6 @@ _BESIDE = "the branch turns back beside a branch point, too close to tell where"
 def _open(p: Sample, q: Sample) -> bool:
     """Whether a multiplier lies within its error of the unit circle at either of two samples."""
     return not (p.floquet.decided and q.floquet.decided)
-
-
-def _separating(samples: list[Sample]) -> list[Sample]:
-    """The fewest of the samples (the first left out, the last kept) between which no test changes twice, and every
-    change that lies between is seen: two real multipliers that meet and cross the circle as a pair are a pair only from
-    close by.
-
-    A pair that crosses the circle is seen in the count of unstable multipliers: it wants an interval of its own.
-    """
-    if len(samples) == 2:
-        return samples[1:]
-    kept = [samples[0]]
-    since: set[str] = set()
-    for p, q in pairwise(samples):
-        now = {kind.name for kind in changes(p, q)}
-        crowded = now & since or (now and since and "NS" in now | since)
-        if p is not kept[-1] and (crowded or {kind.name for kind in changes(kept[-1], q)} != now | since):
-            kept.append(p)
-            since = set()
-        since |= now
-    return [*kept[1:], samples[-1]]
 
 
 def _disagreement(a: CurvePoint, b: CurvePoint) -> float:

@@ -5,24 +5,28 @@ Two events inside one step cancel in every test at its ends. A step is therefore
 
 - the smooth functions of the tests have no zero in it that is not seen at its ends (`crossings`: interpolation through
   its ends and the samples beside it);
-- no contact begins or ceases to touch in it, or it is short: behind a grazing everything changes like a square root,
-  which no interpolation across it foretells.
+- no contact begins or ceases to touch in it, or is about to just beyond it, or it is short. On the side of a grazing on
+  which the contact exists everything changes like a square root of the way to it. No polynomial through places on that
+  side foretells it, unless they lie the closer together the nearer it is: an interval is too long if an excursion
+  across a gap shrinks to less than SHRINKS of itself in it.
 
 Otherwise a point is solved for where the doubt is largest, and its two halves are looked at.
 """
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
+from suboctave.bifurcation.gaps import GapExtrema
 from suboctave.continuation.problem import Array
 from suboctave.curves.audit import Unsettled
 from suboctave.curves.crossings import first_doubtful
-from suboctave.curves.nearing import CUT, GRAZES, contacts_between
 from suboctave.curves.sample import Sample
+from suboctave.harmonic.trigonometric import passages
 
-__all__ = ["FINEST", "Contacts", "Interior", "unsettled"]
+__all__ = ["FINEST", "Interior", "Steps", "unsettled"]
 
 #: intervals of scaled arclength that are not cut any further: events closer together are not told apart
 FINEST = 1e-5
@@ -32,46 +36,99 @@ MOST_PROBES = 60
 _REMEMBERED = 64
 #: intervals shorter than this are not cut because a contact grazes in them
 _LAYER = 1e-3
-#: samples behind a step that it is foretold from, the one that it begins with included
-_BEHIND = 4
+#: excursions across a gap, in units of the largest relative displacement, that may end soon, and the share to which one
+#: may shrink in an interval
+_YOUNG, _SHRINKS = 0.05, 0.3
+#: what an interval's contacts do: nothing, shrink towards its first or its last end, begin or cease within it
+_NOTHING, _FIRST, _LAST, _GRAZES = 0, 1, 2, 3
+#: where an interval is cut whose contacts shrink, as a fraction of it: closer to that end, towards which the intervals
+#: shorten like the excursion
+_CUT = {_FIRST: 0.35, _LAST: 0.65}
 
 
-class Contacts:
-    """What contacts do between samples, remembered while it may be asked again."""
+class Steps:
+    """What lies behind the step of a curve that is looked at, and what contacts do between samples, remembered while it
+    may be asked again.
+    """
+
+    #: samples behind a step that it is foretold from, the one that it begins with included
+    reach = 4
 
     def __init__(self) -> None:
-        self._known: dict[tuple[Sample, Sample], int] = {}
+        self._behind: list[Sample] = []
+        self._contacts: dict[tuple[Sample, Sample], int] = {}
 
-    def between(self, p: Sample, q: Sample) -> int:
-        """See `contacts_between`."""
-        known = self._known.get((p, q))
+    def grazes(self, p: Sample, q: Sample) -> bool:
+        """Whether a contact begins or ceases to touch between two samples."""
+        return self.contacts(p, q) == _GRAZES
+
+    def contacts(self, p: Sample, q: Sample) -> int:
+        """What contacts do between two samples: an excursion across a gap may shrink so much that it may end just
+        beyond the first or the last of them.
+        """
+        known = self._contacts.get((p, q))
         if known is None:
-            known = self._known[p, q] = contacts_between(p, q)
+            known = self._contacts[p, q] = _contacts_between(p, q)
         return known
 
-    def keep(self, samples: Sequence[Sample]) -> None:
-        """Forget what lies between others, when that has become much."""
-        if len(self._known) > _REMEMBERED:
-            kept = set(samples)
-            self._known = {pair: known for pair, known in self._known.items() if kept.issuperset(pair)}
+    def leading_to(self, old: Sample) -> list[Sample]:
+        """The samples that a step from one is foretold from; the last one may have been solved again with other
+        harmonics.
+        """
+        return [*(s for s in self._behind if s.place < old.place), old]
+
+    def keep(self, samples: list[Sample]) -> None:
+        """The last of these lie behind the next step."""
+        self._behind = samples[-self.reach :]
+        if len(self._contacts) > _REMEMBERED:
+            kept = set(self._behind)
+            self._contacts = {pair: known for pair, known in self._contacts.items() if kept.issuperset(pair)}
+
+    def forget(self) -> None:
+        """What lies behind says nothing of what comes (a corner of the equations)."""
+        self._behind = []
+
+
+def _contacts_between(p: Sample, q: Sample) -> int:
+    near = _NOTHING
+    for a, b in zip(p.gaps, q.gaps, strict=True):
+        _, count, crossed, other = passages(a.tau, a.value, a.curve, a.level, b.tau, b.value, b.curve, b.level)
+        if count > 0 or crossed != other:
+            return _GRAZES
+        near = near or (_FIRST if _shrinks(a, b) else _LAST if _shrinks(b, a) else _NOTHING)
+    return near
+
+
+def _shrinks(a: GapExtrema, b: GapExtrema) -> bool:
+    """Whether an excursion of one motion across a gap is a small part of the same excursion of another."""
+    # there are few extrema: numbers are quicker than arrays
+    values = a.value.tolist()
+    young = _YOUNG * max(map(abs, values), default=0.0)
+    for tau, value, curve in zip(a.tau.tolist(), values, a.curve.tolist(), strict=True):
+        height = a.level - value if curve > 0.0 else value - a.level
+        if 0.0 < height < young:
+            others = zip(b.tau.tolist(), b.value.tolist(), b.curve.tolist(), strict=True)
+            alike = [(math.cos(t - tau), v) for t, v, c in others if (c > 0.0) == (curve > 0.0)]
+            _, same = max(alike, key=lambda pair: pair[0], default=(0.0, b.level))
+            if height < _SHRINKS * (b.level - same if curve > 0.0 else same - b.level):
+                return True
+    return False
 
 
 class Interior(ABC):
     """One step under examination; `samples` are all that are known, in order, those behind the step included.
 
-    behind
-        Samples before the step, in order; the last is that which it begins with.
+    steps
+        Those of its curve.
     reasons
         What is in doubt where a function may vanish unseen, one sentence for each of `measures`.
     """
 
-    def __init__(
-        self, behind: list[Sample], new: Sample, contacts: Callable[[Sample, Sample], int], reasons: Sequence[str]
-    ) -> None:
-        behind = behind[-_BEHIND:]
+    def __init__(self, steps: Steps, old: Sample, new: Sample, reasons: Sequence[str]) -> None:
+        behind = steps.leading_to(old)[-Steps.reach :]
         self.samples = [*behind, new]
-        self.old, self.new, self.first = behind[-1], new, len(behind) - 1
-        self.contacts = contacts
+        self.old, self.new, self.first = old, new, len(behind) - 1
+        self.steps = steps
         self.reasons = reasons
         self.size = new.place - self.old.place
         self.probes = 0
@@ -129,11 +186,11 @@ class Interior(ABC):
 
     def doubt(self, p: Sample, q: Sample) -> tuple[float, str] | None:
         """Where to look into an interval, as a fraction of it, and why; None if it is done."""
-        h, contacts = q.place - p.place, self.contacts(p, q)
-        if contacts == GRAZES:
+        h, contacts = q.place - p.place, self.steps.contacts(p, q)
+        if contacts == _GRAZES:
             return (0.5, "a contact begins or ceases to touch") if h > _LAYER else None
         if contacts and h > _LAYER:
-            return CUT[contacts], "a contact that is about to begin or cease changes everything like a square root"
+            return _CUT[contacts], "a contact that is about to begin or cease changes everything like a square root"
         stencil, at = self._around(p, q)
         if len(stencil) < 3:
             return 0.5, "nothing was looked at"
@@ -170,7 +227,7 @@ class Interior(ABC):
             if not 0 <= k < len(samples):
                 break
             beyond = samples[k]
-            if (self.contacts(beyond, here) if way < 0 else self.contacts(here, beyond)) == GRAZES:
+            if self.steps.grazes(beyond, here) if way < 0 else self.steps.grazes(here, beyond):
                 break
             if first is None:
                 first = beyond

@@ -8,7 +8,7 @@ from suboctave.continuation import NewtonOptions
 from suboctave.continuation.point import point_between
 from suboctave.continuation.problem import Array
 from suboctave.curves.audit import joined
-from suboctave.curves.interior import Contacts, Interior
+from suboctave.curves.interior import Interior, Steps
 from suboctave.curves.sample import Sample
 from suboctave.curves.tracked.events import LocatedEvent, events_between
 from suboctave.curves.tracked.tests import CurveTest
@@ -17,31 +17,27 @@ from suboctave.errors import ConvergenceError
 __all__ = ["StepWatch"]
 
 
-class StepWatch:
+class StepWatch(Steps):
     """Looks at the steps of a curve in order, for the events that `tests` tell of."""
 
+    reach = 3
+
     def __init__(self, tests: tuple[CurveTest, ...], newton: NewtonOptions) -> None:
+        super().__init__()
         self.tests = tests
         self.newton = newton
-        #: the last points, and the functions of the tests there
-        self._behind: list[Sample] = []
+        #: the functions of the tests at the last points
         self._functions: dict[Sample, Array] = {}
-        self._contacts = Contacts()
 
     def passed(self, a: Sample, b: Sample, warnings: list[str]) -> list[LocatedEvent]:
         """The events between two neighbours, in the order met."""
-        step = _Step([*(s for s in self._behind if s.place < a.place), a], b, self)
+        step = _Step(self, a, b, [f"two {test.kind} may lie" for test in self.tests])
         if step.size > 0.0:
             step.examine([(a, b)])
         warnings += [f"{stretch}: a smaller max_step may tell" for stretch in joined(step.unsettled)]
-        self._behind = step.samples[-3:]
-        self._contacts.keep(self._behind)
+        self.keep(step.samples)
         self._functions = {s: known for s, known in self._functions.items() if s in self._behind}
         return events_between(step.inside, self.tests, self.newton, warnings)
-
-    def forget(self) -> None:
-        """What lies behind says nothing of what comes (a corner of the equations)."""
-        self._behind = []
 
     def functions(self, sample: Sample) -> Array:
         """The functions of the tests that are smooth along the curve: see `Interior.measures`."""
@@ -50,26 +46,20 @@ class StepWatch:
             known = self._functions[sample] = np.array([test.smooth(sample) for test in self.tests]).T
         return known
 
-    def between(self, p: Sample, q: Sample) -> int:
-        """What contacts do between two samples."""
-        return self._contacts.between(p, q)
-
 
 class _Step(Interior):
     """One step of a tracked curve under examination."""
 
-    def __init__(self, behind: list[Sample], new: Sample, watch: StepWatch) -> None:
-        super().__init__(behind, new, watch.between, [f"two {test.kind} may lie" for test in watch.tests])
-        self.watch = watch
+    steps: StepWatch
 
     def measures(self, sample: Sample) -> Array:
-        return self.watch.functions(sample)
+        return self.steps.functions(sample)
 
     def solved(self, fraction: float) -> Sample | None:
         try:
-            return Sample(point_between(self.old.point, self.new.point, fraction, self.watch.newton))
+            return Sample(point_between(self.old.point, self.new.point, fraction, self.steps.newton))
         except ConvergenceError:
             return None
 
     def harmless(self, p: Sample, q: Sample, reason: str) -> bool:
-        return reason not in self.reasons or self.watch.tests[self.reasons.index(reason)].changed(p, q)
+        return reason not in self.reasons or self.steps.tests[self.reasons.index(reason)].changed(p, q)
