@@ -27,7 +27,7 @@ import suboctave as so
 
 #: what a look is booked on: the first line whose file is anywhere on the stack
 PLACES = (
-    ("located bifurcations", ("curves/events/finder", "curves/events/locate", "bifurcation/bordered")),
+    ("located bifurcations", ("curves/events/monitors", "curves/events/locate", "bifurcation/bordered")),
     ("Floquet multipliers", ("stability/",)),
     ("audit of steps", ("analysis/guard", "analysis/audit", "analysis/crossings", "bifurcation/measures")),
     ("element forces", ("harmonic/group_force", "harmonic/local_force")),

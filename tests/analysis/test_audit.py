@@ -13,8 +13,8 @@ from scipy.optimize import brentq, minimize_scalar
 from slow import slow
 
 import suboctave as so
-from suboctave.curves.audit import Audit, Unsettled
 from suboctave.curves.crossings import first_doubtful
+from suboctave.curves.trace import Audit, Unsettled
 from suboctave.timedomain import locate_by_shooting, shoot
 
 #: beside the default, largest steps that hold whole pairs of events

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import suboctave as so
-from suboctave.curves.count import CountCheck
+from suboctave.curves.ledgers import CountCheck
 from suboctave.errors import InputError
 from suboctave.study.steps.base import as_formulation
 

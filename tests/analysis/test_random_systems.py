@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import suboctave as so
-from suboctave.curves.audit import Unsettled, joined
+from suboctave.curves.trace import Unsettled, joined
 
 
 @pytest.fixture(scope="module")

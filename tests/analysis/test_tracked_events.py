@@ -12,8 +12,7 @@ from suboctave.continuation.linear import length
 from suboctave.continuation.newton import NewtonOptions, correct
 from suboctave.continuation.point import make_point
 from suboctave.curves.sample import Sample
-from suboctave.curves.tracked.events import events_between
-from suboctave.curves.tracked.nearest import nearest_point, same_discretisation, zero_along
+from suboctave.curves.tracked.events import events_between, nearest_point, same_discretisation, zero_along
 from suboctave.curves.tracked.start import curve_through
 from suboctave.curves.tracked.tests import CurveTest, Extremum, GeneralisedDoubling
 from suboctave.harmonic.basis import HarmonicBasis

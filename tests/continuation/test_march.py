@@ -11,7 +11,7 @@ from suboctave.continuation.events import Bracket
 from suboctave.continuation.linear import Factor
 from suboctave.continuation.newton import correct
 from suboctave.continuation.point import between, make_point, point_between
-from suboctave.curves.events.finder import position
+from suboctave.curves.events.monitors import position
 from suboctave.errors import ConvergenceError, InputError
 
 NEWTON = NewtonOptions()

@@ -20,15 +20,12 @@ from suboctave.bifurcation.bordered import branching_equation, null_vectors
 from suboctave.continuation import CurvePoint, NewtonOptions, SteppingOptions
 from suboctave.continuation.linear import length
 from suboctave.continuation.problem import Array
-from suboctave.curves.discretisation import Harmonics, harmonics_of, own_linear_part
-from suboctave.curves.driver import same_event
 from suboctave.curves.events.locate import Singular
-from suboctave.curves.follow import both_ways, follow
+from suboctave.curves.follow import both_ways, follow, same_event
 from suboctave.curves.junction import UNSEEN, beside, curvature_of, doubled, emanating, period_name
 from suboctave.curves.motion import MotionProblem
-from suboctave.curves.points import BranchPoint
-from suboctave.curves.starts import start_point
-from suboctave.curves.trace import Settings, Trace
+from suboctave.curves.starts import Harmonics, harmonics_of, own_linear_part, start_point
+from suboctave.curves.trace import BranchPoint, Settings, Trace
 from suboctave.errors import ConvergenceError, InputError, is_number
 from suboctave.harmonic.linear_part import LinearPart
 from suboctave.harmonic.orbit import PeriodicOrbit

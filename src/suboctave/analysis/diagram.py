@@ -17,8 +17,8 @@ from typing import Any, Protocol, Unpack
 from suboctave.analysis.branches import frequency_response, switch_branch
 from suboctave.analysis.options import CurveOptions, SearchOptions, handed_on
 from suboctave.bifurcation.bifurcation import Bifurcation
-from suboctave.curves.discretisation import Harmonics
 from suboctave.curves.junction import Junction
+from suboctave.curves.starts import Harmonics
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.interruption import Interruption

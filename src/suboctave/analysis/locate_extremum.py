@@ -24,8 +24,7 @@ from suboctave.continuation.problem import Array
 from suboctave.curves.events.formulation import Alcorta2019, BorderedSystem, Formulation, formulation_of
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.sample import Sample
-from suboctave.curves.tracked.events import LocatedEvent, as_event
-from suboctave.curves.tracked.nearest import nearest_point
+from suboctave.curves.tracked.events import LocatedEvent, as_event, nearest_point
 from suboctave.curves.tracked.start import curve_through, is_extremum, with_extremum
 from suboctave.curves.tracked.tests import Extremum
 from suboctave.errors import InputError, shortened

@@ -16,11 +16,10 @@ from typing import Annotated, Any, TypeVar, cast
 from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.continuation import Event, NewtonOptions, SteppingOptions
 from suboctave.continuation.linear import one_thread
-from suboctave.curves.discretisation import Harmonics, make_curve
 from suboctave.curves.events.formulation import FORMULATIONS, Formulation, formulation_of, written
 from suboctave.curves.junction import Junction
 from suboctave.curves.motion import MotionProblem
-from suboctave.curves.starts import linear_response
+from suboctave.curves.starts import Harmonics, linear_response, make_curve
 from suboctave.curves.trace import Settings, Trace
 from suboctave.curves.verdicts import with_verdicts
 from suboctave.errors import InputError, is_number, shortened

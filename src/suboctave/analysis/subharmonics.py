@@ -24,14 +24,12 @@ from suboctave.continuation import CurvePoint, NewtonOptions
 from suboctave.continuation.linear import length, one_thread
 from suboctave.continuation.newton import correct
 from suboctave.continuation.problem import Array
-from suboctave.curves.discretisation import Harmonics, make_curve
 from suboctave.curves.follow import both_ways
 from suboctave.curves.identity import lies_on, relation
-from suboctave.curves.junction import period_name
+from suboctave.curves.junction import period_name, subharmonic_share
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.sample import Sample
-from suboctave.curves.starts import linear_response, start_point
-from suboctave.curves.subharmonic_part import subharmonic_share
+from suboctave.curves.starts import Harmonics, linear_response, make_curve, start_point
 from suboctave.curves.trace import Trace
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.basis import HarmonicBasis

@@ -33,13 +33,12 @@ from suboctave.continuation import CurvePoint, NewtonOptions, SteppingOptions
 from suboctave.continuation.linear import length, one_thread
 from suboctave.continuation.newton import correct
 from suboctave.continuation.point import point_ahead
-from suboctave.curves.discretisation import check_unknowns, harmonics_of, rule_of
 from suboctave.curves.events.formulation import BorderedSystem
+from suboctave.curves.junction import repeats_earlier
 from suboctave.curves.kinds.singular import SingularOperator
 from suboctave.curves.motion import MotionEvaluation, MotionProblem
-from suboctave.curves.points import BranchPoint
-from suboctave.curves.subharmonic_part import repeats_earlier
-from suboctave.curves.trace import Settings, Trace
+from suboctave.curves.starts import check_unknowns, harmonics_of, rule_of
+from suboctave.curves.trace import BranchPoint, Settings, Trace
 from suboctave.curves.tracked.follow import follow_tracked
 from suboctave.curves.tracked.start import Ranges, curve_through, inside, is_extremum, solved_start
 from suboctave.errors import ConvergenceError, InputError, is_number, shortened, suggest

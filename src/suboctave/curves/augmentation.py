@@ -1,7 +1,7 @@
 """What singles a motion out among those of a system: scalar equations beside R = 0, and the unknowns they bring.
 
 An augmentation has one equation more than extra unknowns, so that two free parameters leave a curve; the empty one
-(`kinds.response`) leaves one with a single free parameter. Each kind of curve is a file in `kinds`.
+leaves the responses, along a single free parameter. Each kind of curve is a file in `kinds`.
 
 Bordering vectors are frozen within Newton's method, which then solves fixed smooth equations, and renewed at every
 accepted point, from where they are the null vectors themselves.
@@ -10,6 +10,7 @@ accepted point, from where they are the null vectors themselves.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -120,3 +121,29 @@ class Augmentation(ABC):
     def carried(self, extra: Array, basis: HarmonicBasis, size: int) -> Array:
         """Extra unknowns in a basis with other harmonics."""
         return extra
+
+
+@dataclass(frozen=True)
+class Plain(Augmentation):
+    """No scalar equation: all motions, along one free parameter."""
+
+    name = "response"
+
+    def at(self, state: BalanceState, extra: Array, names: tuple[str, ...]) -> NoEquations:
+        return NoEquations(state, self)
+
+
+PLAIN = Plain()
+
+
+class NoEquations(Equations):
+    """Nothing beside the equations of motion."""
+
+    values = rows = np.zeros(0)
+
+    def __init__(self, state: BalanceState, of: Plain) -> None:
+        self.state = state
+        self.of = of
+
+    def renewed(self) -> Plain:
+        return self.of

@@ -24,11 +24,10 @@ from itertools import pairwise
 from suboctave.continuation.linear import length
 from suboctave.continuation.point import CurvePoint, between
 from suboctave.continuation.problem import Array
-from suboctave.curves.audit import Audit
-from suboctave.curves.events.finder import Located
-from suboctave.curves.events.monitors import BRANCH_POINT, NEIMARK_SACKER, changes
+from suboctave.curves.events.monitors import BRANCH_POINT, NEIMARK_SACKER, Located, changes
 from suboctave.curves.interior import FINEST, Interior, Steps, unsettled
 from suboctave.curves.sample import Sample
+from suboctave.curves.trace import Audit
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.basis import ComplexArray
 

@@ -21,9 +21,9 @@ from collections.abc import Sequence
 
 from suboctave.bifurcation.gaps import GapExtrema
 from suboctave.continuation.problem import Array
-from suboctave.curves.audit import Unsettled
 from suboctave.curves.crossings import first_doubtful
 from suboctave.curves.sample import Sample
+from suboctave.curves.trace import Unsettled
 from suboctave.harmonic.trigonometric import passages
 
 __all__ = ["FINEST", "Interior", "Steps", "unsettled"]

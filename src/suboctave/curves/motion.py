@@ -20,8 +20,7 @@ import numpy as np
 from suboctave.bifurcation.gaps import rests_in_corner
 from suboctave.continuation.linear import length
 from suboctave.continuation.problem import Array, Curve, Evaluation
-from suboctave.curves.augmentation import Augmentation, Equations
-from suboctave.curves.kinds.response import PLAIN
+from suboctave.curves.augmentation import PLAIN, Augmentation, Equations
 from suboctave.errors import ConvergenceError
 from suboctave.floquet.monodromy import floquet_multipliers
 from suboctave.floquet.result import FloquetResult

@@ -11,7 +11,6 @@ from suboctave.bifurcation.bordered import branching_equation
 from suboctave.continuation import NewtonOptions
 from suboctave.continuation.linear import distance, length
 from suboctave.continuation.point import solved_again
-from suboctave.curves.events.finder import Located, locate, position
 from suboctave.curves.events.layer import (
     behind_grazing,
     grazing_beside,
@@ -20,7 +19,7 @@ from suboctave.curves.events.layer import (
     unresolved,
 )
 from suboctave.curves.events.locate import Guess, Singular
-from suboctave.curves.events.monitors import BRANCH_POINT, BifurcationKind
+from suboctave.curves.events.monitors import BRANCH_POINT, BifurcationKind, Located, locate, position
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.sample import Sample
 from suboctave.errors import ConvergenceError

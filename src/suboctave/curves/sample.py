@@ -24,7 +24,7 @@ from suboctave.curves.kinds.extremum import ExtremalEquations
 from suboctave.curves.kinds.grazing import GrazingEquations
 from suboctave.curves.kinds.singular import SingularEquations, SingularOperator
 from suboctave.curves.motion import MotionEvaluation, MotionProblem
-from suboctave.curves.points import BranchPoint
+from suboctave.curves.trace import BranchPoint
 from suboctave.floquet.methods import Monodromy, StabilityMethod
 from suboctave.floquet.result import FloquetResult
 from suboctave.harmonic.basis import Array, ComplexArray

@@ -18,9 +18,7 @@ from suboctave.bifurcation.bifurcation import CONTACT_KINDS, Bifurcation
 from suboctave.bifurcation.measures import in_doubt
 from suboctave.continuation.ending import Ending
 from suboctave.continuation.linear import Factor
-from suboctave.curves.audit import Unsettled, joined
-from suboctave.curves.points import BranchPoint
-from suboctave.curves.trace import Trace
+from suboctave.curves.trace import BranchPoint, Trace, Unsettled, joined
 from suboctave.floquet.methods import StabilityMethod
 from suboctave.floquet.result import FloquetResult, written
 from suboctave.harmonic.evaluation import BalanceState

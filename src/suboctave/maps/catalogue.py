@@ -22,11 +22,10 @@ from suboctave.analysis.subharmonics import Seeds, isolated_branches
 from suboctave.analysis.track import track
 from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.continuation import NewtonOptions
-from suboctave.curves.discretisation import Harmonics, harmonics_of, make_curve, own_linear_part, rule_of
 from suboctave.curves.identity import gap_to, lies_on
 from suboctave.curves.junction import period_name
 from suboctave.curves.sample import Sample
-from suboctave.curves.starts import start_point
+from suboctave.curves.starts import Harmonics, harmonics_of, make_curve, own_linear_part, rule_of, start_point
 from suboctave.errors import ConvergenceError, InputError, is_number, shortened
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.interruption import Interruption, pass_on

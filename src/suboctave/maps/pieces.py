@@ -25,13 +25,13 @@ from suboctave.analysis.diagram import span_of
 from suboctave.bifurcation.bifurcation import Bifurcation, TrackedEvent
 from suboctave.continuation.linear import one_thread
 from suboctave.continuation.problem import Array
-from suboctave.curves.discretisation import own_linear_part
 from suboctave.curves.events.locate import Guess
 from suboctave.curves.events.monitors import LIMIT_POINT
 from suboctave.curves.identity import gap_to, lies_on
 from suboctave.curves.motion import MotionProblem
-from suboctave.curves.points import BranchPoint, TrackedPoint
 from suboctave.curves.refine import solved_bifurcation
+from suboctave.curves.starts import own_linear_part
+from suboctave.curves.trace import BranchPoint, TrackedPoint
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.evaluation import HarmonicBalance
 from suboctave.harmonic.orbit import PeriodicOrbit

@@ -14,9 +14,8 @@ import numpy as np
 from suboctave.bifurcation.bifurcation import Bifurcation, BifurcationList, target_multiplier
 from suboctave.continuation.ending import Ending, interruption_of, sentence
 from suboctave.continuation.problem import Array
-from suboctave.curves.audit import Audit
 from suboctave.curves.junction import Junction, period_name
-from suboctave.curves.points import BranchPoint, TrackedPoint
+from suboctave.curves.trace import Audit, BranchPoint, TrackedPoint
 from suboctave.errors import InputError, suggest
 from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.orbit import PeriodicOrbit

@@ -20,9 +20,8 @@ from suboctave.bifurcation.bordered import NullVectors
 from suboctave.bifurcation.gaps import GrazingContact
 from suboctave.bifurcation.normal_form import NormalForm
 from suboctave.continuation.ending import Ending, read_endings
-from suboctave.curves.audit import Audit, Unsettled
 from suboctave.curves.junction import Junction
-from suboctave.curves.points import BranchPoint, TrackedPoint
+from suboctave.curves.trace import Audit, BranchPoint, TrackedPoint, Unsettled
 from suboctave.errors import InputError
 from suboctave.floquet.result import FloquetResult
 from suboctave.harmonic.basis import HarmonicBasis

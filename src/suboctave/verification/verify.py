@@ -21,7 +21,7 @@ import numpy as np
 from suboctave.bifurcation.bifurcation import CONTACT_KINDS, Bifurcation, TrackedEvent
 from suboctave.continuation.linear import one_thread
 from suboctave.continuation.problem import Array
-from suboctave.curves.points import BranchPoint
+from suboctave.curves.trace import BranchPoint
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.floquet.methods import StabilityMethod, method_of
 from suboctave.floquet.result import FloquetResult

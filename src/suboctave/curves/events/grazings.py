@@ -35,9 +35,8 @@ from suboctave.bifurcation.gaps import (
 )
 from suboctave.continuation.newton import NewtonOptions
 from suboctave.continuation.point import point_between
-from suboctave.curves.events.finder import Located, solved_between
 from suboctave.curves.events.locate import Guess, Singular, solve
-from suboctave.curves.events.monitors import BifurcationKind
+from suboctave.curves.events.monitors import BifurcationKind, Located, solved_between
 from suboctave.curves.kinds.grazing import GrazingContactEquations
 from suboctave.curves.sample import Sample
 from suboctave.errors import ConvergenceError

@@ -13,9 +13,8 @@ import numpy as np
 from suboctave.bifurcation.bordered import NullVectors, at_values
 from suboctave.continuation.newton import NewtonOptions, correct
 from suboctave.continuation.point import CurvePoint
-from suboctave.curves.augmentation import Augmentation
+from suboctave.curves.augmentation import PLAIN, Augmentation
 from suboctave.curves.kinds.branch_point import BranchPointEquations, BranchPointUnfolded
-from suboctave.curves.kinds.response import PLAIN
 from suboctave.curves.kinds.singular import SingularEquations, SingularOperator
 from suboctave.curves.motion import MotionEvaluation, MotionProblem
 from suboctave.errors import ConvergenceError

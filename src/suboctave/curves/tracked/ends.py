@@ -26,13 +26,12 @@ from suboctave.continuation import CurvePoint, NewtonOptions
 from suboctave.continuation.point import point_ahead
 from suboctave.continuation.problem import Array
 from suboctave.curves.augmentation import Augmentation
+from suboctave.curves.junction import NOTHING_LEFT, doubled_size, subharmonic_share
 from suboctave.curves.kinds.branch_point import BranchPointUnfolded
 from suboctave.curves.kinds.singular import SingularOperator
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.sample import Sample
-from suboctave.curves.subharmonic_part import NOTHING_LEFT, doubled_size, subharmonic_share
-from suboctave.curves.tracked.events import LocatedEvent
-from suboctave.curves.tracked.nearest import nearest_point, zero_along
+from suboctave.curves.tracked.events import LocatedEvent, nearest_point, zero_along
 from suboctave.curves.tracked.tests import CurveTest, DoubleMultiplier, GeneralisedDoubling
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.evaluation import BalanceState
@@ -278,7 +277,7 @@ def _resonance(a: Sample, double: bool, newton: NewtonOptions) -> End:
     for augmentation in singled_out:
         try:
             curve = replace(a.curve, augmentation=augmentation())
-            event = _zero_beside(a, curve, a.state.x, DoubleMultiplier(order), newton, _AROUND)
+            event = _zero_beside(a, curve, a.state.x, DoubleMultiplier(f"R{order}"), newton, _AROUND)
             break
         except ConvergenceError as failure:
             failures.append(str(failure))

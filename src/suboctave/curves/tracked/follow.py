@@ -13,17 +13,15 @@ from suboctave.continuation.bounds import Bounds
 from suboctave.continuation.ending import Ending, EndReason
 from suboctave.continuation.linear import cosine, length
 from suboctave.continuation.point import solved_again
-from suboctave.curves.driver import Driver
+from suboctave.curves.follow import Driver
+from suboctave.curves.junction import keeps_subharmonics
 from suboctave.curves.motion import CRITICAL_EVERY, MotionProblem
-from suboctave.curves.points import TrackedPoint
 from suboctave.curves.sample import Sample
-from suboctave.curves.subharmonic_part import keeps_subharmonics
-from suboctave.curves.trace import Settings, Trace
+from suboctave.curves.trace import Settings, Trace, TrackedPoint
 from suboctave.curves.tracked.corners import beyond_corner
 from suboctave.curves.tracked.ends import End, comes_close, end_ahead, end_between, is_lopsided, points_before, rebased
-from suboctave.curves.tracked.events import LocatedEvent, as_event, events_between, extreme_of, refined
+from suboctave.curves.tracked.events import LocatedEvent, StepWatch, as_event, events_between, extreme_of, refined
 from suboctave.curves.tracked.start import Ranges
-from suboctave.curves.tracked.steps import StepWatch
 from suboctave.curves.tracked.tests import Extremum, tests_of
 from suboctave.errors import ConvergenceError
 

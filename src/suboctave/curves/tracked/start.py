@@ -14,13 +14,11 @@ from suboctave.continuation import CurvePoint
 from suboctave.continuation.linear import length
 from suboctave.continuation.newton import null_row
 from suboctave.curves.augmentation import Augmentation
-from suboctave.curves.discretisation import own_linear_part
 from suboctave.curves.events.formulation import BORDERED, Formulation
-from suboctave.curves.kinds.extremum import LimitPointExtremal
-from suboctave.curves.kinds.extremum_bordered import BorderedExtremal
+from suboctave.curves.kinds.extremum import BorderedExtremal, LimitPointExtremal
 from suboctave.curves.kinds.singular import SingularOperator
 from suboctave.curves.motion import MotionProblem
-from suboctave.curves.starts import settled
+from suboctave.curves.starts import own_linear_part, settled
 from suboctave.curves.trace import Settings
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.basis import HarmonicBasis

@@ -52,12 +52,9 @@ _ON_IT = 0.03
 
 
 class CurveTest(ABC):
-    """One kind of event: a function of the curve's points that changes sign."""
+    """One kind of event: a function of the curve's points that changes sign; `kind` is what the events are called."""
 
-    @property
-    @abstractmethod
-    def kind(self) -> str:
-        """What the events are called."""
+    kind: str
 
     @abstractmethod
     def value(self, sample: Sample) -> float:
@@ -114,7 +111,7 @@ class Extremum(CurveTest):
         return not (self._level(a) and self._level(b)) and super().changed(a, b)
 
     def smooth(self, sample: Sample) -> tuple[float, float]:
-        """See `CurveTest.smooth`: at a cusp it vanishes as well; the same all along a parameter that stays as it is."""
+        # at a cusp it vanishes as well; the same all along a parameter that stays as it is
         slope = sample.slopes[self.name]
         return (1.0, _logarithm(_LEVEL)) if self._level(sample) else (math.copysign(1.0, slope), _logarithm(slope))
 
@@ -153,19 +150,14 @@ class GeneralisedDoubling(CurveTest):
 class DoubleMultiplier(CurveTest):
     """R1 on LP curves, R2 on PD curves: a curve of Neimark-Sacker points begins."""
 
-    order: int
-
-    @property
-    def kind(self) -> str:
-        """R1 or R2."""
-        return f"R{self.order}"
+    kind: str
 
     def value(self, sample: Sample) -> float:
         return sample.twist
 
     def genuine(self, sample: Sample) -> bool:
         """See `CurveTest.genuine`; raises ConvergenceError where the multipliers contradict."""
-        critical = 1.0 if self.order == 1 else -1.0
+        critical = 1.0 if self.kind == "R1" else -1.0
         apart = np.sort(np.abs(sample.evaluation.floquet.multipliers - critical))
         if apart[1] > _RESONANT:
             raise ConvergenceError(
@@ -179,12 +171,8 @@ class DoubleMultiplier(CurveTest):
 class Resonance(CurveTest):
     """R3, R4 on NS curves: kappa = w0 / order."""
 
+    kind: str
     order: int
-
-    @property
-    def kind(self) -> str:
-        """R3 or R4."""
-        return f"R{self.order}"
 
     def value(self, sample: Sample) -> float:
         share = sample.kappa / sample.state.rate
@@ -198,14 +186,9 @@ class RealCrossing(CurveTest):
     curves; between neighbours by g of that operator with fixed borders.
     """
 
+    kind: str
     operator: Kind
-    label: str
     borders: NullVectors | None = None
-
-    @property
-    def kind(self) -> str:
-        """LPPD, LPNS, PDNS or NSNS."""
-        return self.label
 
     def value(self, sample: Sample) -> float:
         if self.borders is None:
@@ -220,13 +203,13 @@ class RealCrossing(CurveTest):
         return 1.0 if self.operator is Kind.INTEGER else -1.0
 
     def smooth(self, sample: Sample) -> tuple[float, float]:
-        """See `CurveTest.smooth`: without the factor of the pair that an NS curve follows, which may pass there."""
+        # without the factor of the pair that an NS curve follows, which may pass there
         sign, size = sample.determinant(self.operator)
         critical = sample.evaluation.critical
         return sign, size if critical is None else size - 2.0 * _logarithm(abs(critical - self._target))
 
     def genuine(self, sample: Sample) -> bool:
-        """See `CurveTest.genuine`: close to R1 and R2 the pair that an NS curve follows is critical itself."""
+        # close to R1 and R2 the pair that an NS curve follows is critical itself
         if self.kind == "LPPD":
             return True
         target, critical = self._target, sample.evaluation.critical
@@ -242,7 +225,7 @@ class LimitOrBranchPoint(RealCrossing):
     def genuine(self, sample: Sample) -> bool:
         vectors = null_vectors(sample.state, Kind.INTEGER)
         forced = all(transversality(sample.state, vectors, name) <= _TRANSVERSAL for name in sample.curve.names)
-        return forced == (self.label == "BP")
+        return forced == (self.kind == "BP")
 
 
 @dataclass(frozen=True)
@@ -254,27 +237,22 @@ class PairCrossing(CurveTest):
     `target` is where on the circle the pair passes.
     """
 
-    label: str
+    kind: str
     target: complex | None = None
     borders: NullVectors | None = None
-
-    @property
-    def kind(self) -> str:
-        """LPPD, LPNS, PDNS or NSNS."""
-        return self.label
 
     def changed(self, a: Sample, b: Sample) -> bool:
         return _passing(a.others, b.others) is not None
 
     def within(self, a: Sample, b: Sample) -> CurveTest:
-        """See `CurveTest.within`; the target stays where none passes."""
+        # the target stays where none passes
         pair = _passing(a.others, b.others)
         target = self.target if pair is None else (pair[0] + pair[1]) / abs(pair[0] + pair[1])
         assert target is not None
-        return replace(self, target=target, borders=null_vectors(b.state, Kind.FREE, _frequency(b, target)))
+        kappa = float(np.angle(_nearest_pair(b, target))) * b.state.rate / (2.0 * np.pi)
+        return replace(self, target=target, borders=null_vectors(b.state, Kind.FREE, kappa))
 
     def value(self, sample: Sample) -> float:
-        """See `CurveTest.value`: logarithm of the pair's modulus."""
         assert self.target is not None
         assert self.borders is not None
         rate, pair = sample.state.rate, _nearest_pair(sample, self.target)
@@ -301,7 +279,7 @@ class PairCrossing(CurveTest):
         return bool(pairs.size) and math.log(abs(_nearest_pair(sample, self.target))) ** 2 < (_ON_IT + error) ** 2
 
     def smooth(self, sample: Sample) -> tuple[float, float]:
-        """See `CurveTest.smooth`: it vanishes at neutral saddles as well."""
+        # it vanishes at neutral saddles as well
         sign, size = symmetric_functions(sample.others)[:, 2].tolist()
         return sign, size
 
@@ -317,11 +295,6 @@ def _nearest_pair(sample: Sample, target: complex) -> complex:
     if not pairs.size:
         raise ConvergenceError("the pair of multipliers splits into two real ones")
     return complex(pairs[np.argmin(np.abs(pairs - target))])
-
-
-def _frequency(sample: Sample, target: complex) -> float:
-    """kappa of that multiplier."""
-    return float(np.angle(_nearest_pair(sample, target))) * sample.state.rate / (2.0 * np.pi)
 
 
 def _passing(first: ComplexArray, last: ComplexArray) -> tuple[complex, complex] | None:
@@ -350,42 +323,36 @@ def _census(mu: ComplexArray) -> tuple[int, int, int]:
 
 #: on curves of motions that need no critical multiplier
 _OF_MOTIONS = (
-    LimitOrBranchPoint(Kind.INTEGER, "LP"),
-    LimitOrBranchPoint(Kind.INTEGER, "BP"),
-    RealCrossing(Kind.HALF, "PD"),
+    LimitOrBranchPoint("LP", Kind.INTEGER),
+    LimitOrBranchPoint("BP", Kind.INTEGER),
+    RealCrossing("PD", Kind.HALF),
     PairCrossing("NS"),
 )
+#: on curves of bifurcations, from the third on of several DOFs: one has two multipliers with a positive product, of which
+#: none is left that could pass +1 or -1, or be one of a pair
+_OF_BIFURCATIONS: dict[Kind, tuple[CurveTest, ...]] = {
+    Kind.INTEGER: (Cusp(), DoubleMultiplier("R1"), RealCrossing("LPPD", Kind.HALF), PairCrossing("LPNS")),
+    Kind.HALF: (
+        GeneralisedDoubling(),
+        DoubleMultiplier("R2"),
+        RealCrossing("LPPD", Kind.INTEGER),
+        PairCrossing("PDNS"),
+    ),
+    Kind.FREE: (
+        Resonance("R3", 3),
+        Resonance("R4", 4),
+        RealCrossing("LPNS", Kind.INTEGER),
+        RealCrossing("PDNS", Kind.HALF),
+        PairCrossing("NSNS"),
+    ),
+}
 
 
 def tests_of(curve: MotionProblem) -> tuple[CurveTest, ...]:
     """What to look for along a curve, by the kind of its bifurcations."""
-    turns = tuple(Extremum(name) for name in curve.names)
-    augmentation = curve.augmentation.own
-    if augmentation.name in MOTION_KINDS:
+    turns, own = tuple(Extremum(name) for name in curve.names), curve.augmentation.own
+    if own.name in MOTION_KINDS:
         return (*turns, *_OF_MOTIONS)
-    if not isinstance(augmentation, SingularOperator):
+    if not isinstance(own, SingularOperator):
         return turns
-    own: dict[Kind, tuple[CurveTest, ...]] = {
-        Kind.INTEGER: (Cusp(), DoubleMultiplier(1)),
-        Kind.HALF: (GeneralisedDoubling(), DoubleMultiplier(2)),
-        Kind.FREE: (Resonance(3), Resonance(4)),
-    }
-    # one DOF has two multipliers with a positive product: none is left that could pass +1 or -1, or be one of a pair
-    others: dict[Kind, tuple[CurveTest, ...]] = {
-        Kind.INTEGER: (RealCrossing(Kind.HALF, "LPPD"), PairCrossing("LPNS")),
-        Kind.HALF: (RealCrossing(Kind.INTEGER, "LPPD"), PairCrossing("PDNS")),
-        Kind.FREE: (RealCrossing(Kind.INTEGER, "LPNS"), RealCrossing(Kind.HALF, "PDNS"), PairCrossing("NSNS")),
-    }
-    several = curve.balance.system.n > 1
-    return turns + own[augmentation.kind] + (others[augmentation.kind] if several else ())
-
-
-__all__ = [
-    "CurveTest",
-    "Cusp",
-    "DoubleMultiplier",
-    "Extremum",
-    "GeneralisedDoubling",
-    "PairCrossing",
-    "tests_of",
-]
+    return turns + _OF_BIFURCATIONS[own.kind][: 2 if curve.balance.system.n == 1 else None]

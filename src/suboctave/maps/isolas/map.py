@@ -27,7 +27,7 @@ from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.continuation.problem import Array
 from suboctave.curves.identity import lies_on
 from suboctave.curves.junction import period_name
-from suboctave.curves.points import TrackedPoint
+from suboctave.curves.trace import TrackedPoint
 from suboctave.errors import ConvergenceError, InputError, is_number, suggest
 from suboctave.interruption import Interruption, pass_on
 from suboctave.maps.catalogue import FAILURES, PlaneMap, SearchRange, Work, branch_through, carrier_of, checked_values

@@ -15,7 +15,7 @@ from suboctave.analysis.options import SearchOptions
 from suboctave.bifurcation.bifurcation import TrackedEvent
 from suboctave.continuation.ending import Ending, EndReason
 from suboctave.curves.junction import period_name
-from suboctave.curves.points import TrackedPoint
+from suboctave.curves.trace import TrackedPoint
 from suboctave.errors import ConvergenceError, InputError, is_number, suggest
 from suboctave.interruption import Interruption, limited
 from suboctave.maps.catalogue import SearchRange, branch_through, checked_values

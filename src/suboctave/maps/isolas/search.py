@@ -33,9 +33,9 @@ from suboctave.analysis.diagram import Followed
 from suboctave.analysis.options import SearchOptions
 from suboctave.analysis.subharmonics import Seeds, check_seeds
 from suboctave.bifurcation.bifurcation import TrackedEvent
-from suboctave.curves.discretisation import Harmonics, own_linear_part
 from suboctave.curves.identity import image_of, lies_on, relation
 from suboctave.curves.junction import period_name
+from suboctave.curves.starts import Harmonics, own_linear_part
 from suboctave.errors import ConvergenceError, InputError, is_number
 from suboctave.harmonic.evaluation import HarmonicBalance
 from suboctave.harmonic.orbit import PeriodicOrbit

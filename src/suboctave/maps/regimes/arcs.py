@@ -10,7 +10,7 @@ import numpy as np
 
 from suboctave.continuation.problem import Array
 from suboctave.curves.junction import period_name
-from suboctave.curves.points import BranchPoint
+from suboctave.curves.trace import BranchPoint
 from suboctave.maps.pieces import MonotonePiece, across
 from suboctave.results.branch import Branch
 

@@ -21,10 +21,9 @@ import numpy as np
 from suboctave.analysis.subharmonics import periodic_orbit
 from suboctave.continuation.linear import one_thread
 from suboctave.continuation.problem import Array
-from suboctave.curves.discretisation import make_curve
 from suboctave.curves.identity import apart
 from suboctave.curves.junction import period_name
-from suboctave.curves.starts import linear_response
+from suboctave.curves.starts import linear_response, make_curve
 from suboctave.errors import ConvergenceError
 from suboctave.experiments.poincare import Attractor, poincare_sections
 from suboctave.floquet.monodromy import floquet_multipliers

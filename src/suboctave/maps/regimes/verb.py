@@ -26,9 +26,9 @@ from suboctave.analysis.diagram import Followed, grown_from
 from suboctave.analysis.options import SearchOptions
 from suboctave.analysis.subharmonics import Seeds, check_seeds
 from suboctave.bifurcation.bifurcation import Bifurcation, TrackedEvent
-from suboctave.curves.discretisation import Harmonics
 from suboctave.curves.identity import lies_on, mirrored
 from suboctave.curves.junction import period_name
+from suboctave.curves.starts import Harmonics
 from suboctave.errors import InputError, is_number, shortened
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.interruption import pass_on, unlimited
