@@ -6,6 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from bisect import insort
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -35,7 +36,7 @@ from suboctave.curves.ledgers import REASON, CountCheck, DoublingWatch, HiddenDo
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.refine import bifurcation_at, solved_bifurcation, turns_at
 from suboctave.curves.sample import Sample
-from suboctave.curves.trace import Doubt, Settings, Trace, joined
+from suboctave.curves.trace import Settings, Trace, joined
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.interruption import Interruption
 
@@ -96,17 +97,13 @@ def same_event(a: Bifurcation, b: Bifurcation) -> bool:
     """Whether two located bifurcations are one, met twice."""
     if (a.kind, a.parameter_name) != (b.kind, b.parameter_name):
         return False
-    if a.kind == "grazing" and _element(a) != _element(b):
+    if a.kind == "grazing" and len({item.contact and item.contact.element for item in (a, b)}) > 1:
         return False
     same_place = all(np.isclose(a.parameter(name), b.parameter(name), rtol=1e-9) for name in a.free_names)
     if not (same_place and np.isclose(a.amplitude, b.amplitude, rtol=1e-6)):
         return False
     # the mirror image of a motion has its amplitude; at rest there is nothing to compare
     return max(a.amplitude, b.amplitude) <= _NOTHING or relation(a.orbit, b.orbit).one
-
-
-def _element(item: Bifurcation) -> int | None:
-    return None if item.contact is None else item.contact.element
 
 
 def _drop_seam(items: list[Bifurcation]) -> None:
@@ -284,7 +281,7 @@ class _Follower(Driver):
         sentences: list[str] = []
         item = bifurcation_at(located, a, b, self.settings.observe, sentences)
         if item is not None:
-            self.trace.doubts += [Doubt(item.orbit, text) for text in sentences]
+            self.trace.doubts += [(item.orbit, text) for text in sentences]
         return item
 
     def _look_behind(self, inside: list[Sample]) -> None:
@@ -296,7 +293,7 @@ class _Follower(Driver):
                 if self._insert(item):
                     self._count.noted(item)
             if len(items) < 2:
-                self._guard.doubt(stretch.before, stretch.behind, REASON)
+                self._guard.doubt(stretch[0], stretch[2], REASON)
         self.trace.open += [s.as_point(s.floquet) for s in inside[1:-1] if not s.floquet.decided]
 
     def _search_here(self, old: Sample, again: Sample) -> None:
@@ -409,21 +406,15 @@ class _Follower(Driver):
         return located
 
     def _event_value(self, event: Event, sample: Sample) -> float:
-        orbit = sample.orbit
         try:
-            value = event.function(orbit)
+            value = event.function(sample.orbit)
         except Exception as failure:
-            where = sample.where
-            failure.add_note(f"raised by the function of the event {event.name!r} at {where}")
+            failure.add_note(f"raised by the function of the event {event.name!r} at {sample.where}")
             raise
-        try:
-            number = float(value)
-        except (TypeError, ValueError, OverflowError):
-            number = float("nan")
-        if not np.isfinite(number):
-            where = sample.where
-            raise InputError(f"event {event.name!r} returned {value!r} at {where}; it must return a finite number")
-        return number
+        with suppress(TypeError, ValueError, OverflowError):
+            if np.isfinite(number := float(value)):
+                return number
+        raise InputError(f"event {event.name!r} returned {value!r} at {sample.where}; it must return a finite number")
 
     def _event(self, event: Event, a: Sample, b: Sample) -> Bifurcation | None:
         value_a, value_b = (self._event_value(event, sample) for sample in (a, b))

@@ -24,11 +24,11 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from enum import Enum
-from typing import Protocol
 
 import numpy as np
 
 from suboctave.continuation.problem import Array
+from suboctave.curves.trace import BranchPoint
 from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.orbit import PeriodicOrbit
 
@@ -53,15 +53,6 @@ class Relation(Enum):
     def one(self) -> bool:
         """Whether the two are one motion: the same, at the same instants or shifted by whole periods of the load."""
         return self in (Relation.SAME, Relation.SHIFTED)
-
-
-class Point(Protocol):
-    """A point of a branch or of a tracked curve."""
-
-    @property
-    def orbit(self) -> PeriodicOrbit:
-        """Its motion."""
-        ...
 
 
 def relation(one: PeriodicOrbit, other: PeriodicOrbit) -> Relation:
@@ -110,12 +101,12 @@ def mirrored(orbit: PeriodicOrbit) -> PeriodicOrbit | None:
 
 
 # ----------------------------------------------------------------------------------------------------- motion and curve
-def lies_on(orbit: PeriodicOrbit, points: Sequence[Point], name: str = "", images: bool = False) -> bool:
+def lies_on(orbit: PeriodicOrbit, points: Sequence[BranchPoint], name: str = "", images: bool = False) -> bool:
     """Whether a motion, or a shift of it, lies on the curve through others; arguments as of `gap_to`."""
     return gap_to(orbit, points, name, images) is not None
 
 
-def gap_to(orbit: PeriodicOrbit, points: Sequence[Point], name: str = "", images: bool = False) -> float | None:
+def gap_to(orbit: PeriodicOrbit, points: Sequence[BranchPoint], name: str = "", images: bool = False) -> float | None:
     """How far a motion lies off the curve through others in order, in units of what is allowed; None if farther.
 
     What is compared is the motion, its frequency, and with a name the parameter of that name. Between two points the

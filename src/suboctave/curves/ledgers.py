@@ -26,8 +26,7 @@ from suboctave.curves.events.monitors import PERIOD_DOUBLING, BifurcationKind, L
 from suboctave.curves.refine import solved_in
 from suboctave.curves.sample import Sample
 from suboctave.errors import ConvergenceError
-from suboctave.harmonic.basis import HarmonicBasis
-from suboctave.harmonic.truncation import AdaptiveHarmonics, choose_harmonics, next_harmonics
+from suboctave.harmonic.truncation import choose_harmonics, next_harmonics
 
 #: multipliers this close to the unit circle are not counted when the count is held against the located bifurcations
 _NEAR_CIRCLE = 0.02
@@ -58,39 +57,30 @@ class CountCheck:
         if last is None:
             return None
         odd = sum(kind in ("LP", "PD", "BP") for kind in kinds)
-        pairs = kinds.count("NS")
         before, now = last.unstable, sample.unstable
         change = abs(now - before)
         # a branch that turns back at a pitchfork is its own mirror image behind it: the count does not change there
-        branching = "BP" in kinds
-        if change <= odd + 2 * pairs and (branching or (change - odd) % 2 == 0):
+        if change <= odd + 2 * kinds.count("NS") and ("BP" in kinds or (change - odd) % 2 == 0):
             return None
-        names = ", ".join(kinds) or "none"
-        return (
-            last,
-            sample,
+        reason = (
             f"the number of unstable multipliers changes from {before} to {now}, which the bifurcations located there "
-            f"({names}) do not explain",
+            f"({', '.join(kinds) or 'none'}) do not explain"
         )
+        return last, sample, reason
 
 
 REASON = "a multiplier passes -1 and comes back, which the harmonics solved for do not show"
 
 
-@dataclass(frozen=True)
-class Stretch:
-    """Three motions in the order of the curve: outside, between and outside a hidden pair."""
-
-    before: Sample
-    inside: Sample
-    behind: Sample
+#: three motions in the order of the curve: outside, between and outside a hidden pair
+Stretch = tuple[Sample, Sample, Sample]
 
 
-@dataclass
 class HiddenDoublings:
     """Watches a curve for stretches in which multipliers and det J_half differ."""
 
-    _since: list[Sample] = field(default_factory=list)
+    def __init__(self) -> None:
+        self._since: list[Sample] = []
 
     def forget(self) -> None:
         """What lies behind says nothing of what comes."""
@@ -106,7 +96,7 @@ class HiddenDoublings:
             if len(self._since) > 1:
                 before, *between = self._since
                 if all(s.half_sign == before.half_sign for s in (*between, sample)):
-                    stretches.append(Stretch(before, max(between, key=lambda s: s.measures[1, 2]), sample))
+                    stretches.append((before, max(between, key=lambda s: s.measures[1, 2]), sample))
             self._since = [sample]
         return stretches
 
@@ -119,12 +109,13 @@ def pair_in(stretch: Stretch, newton: NewtonOptions) -> list[tuple[Located, Samp
     """The hidden period doublings, each with the two motions of more harmonics that it lies between; none if they are
     not there, or not found.
     """
-    samples = (stretch.before, stretch.inside, stretch.behind)
-    curve = stretch.inside.curve
+    samples, curve = stretch, stretch[1].curve
     doublings: list[tuple[Located, Sample, Sample]] = []
     while curve.adaptive is not None:
-        present = samples[1].state
-        basis = _wanted(doublings, curve.adaptive) if doublings else next_harmonics(present, curve.adaptive)
+        present, rule = samples[1].state, curve.adaptive
+        found = [item.sample.state if item.solution is None else item.solution.state for item, _, _ in doublings]
+        bases = [choose_harmonics(state, rule, rule.event_tolerance) for state in found]
+        basis = max(bases or [next_harmonics(present, rule)], key=lambda basis: basis.harmonics)
         if basis.harmonics <= present.basis.harmonics:
             break
         curve, _ = curve.finer(present, basis)
@@ -142,13 +133,6 @@ def pair_in(stretch: Stretch, newton: NewtonOptions) -> list[tuple[Located, Samp
         pairs = [(a, b, locate(PERIOD_DOUBLING, a, b, newton)) for a, b in ((first, middle), (middle, last))]
         doublings = [(item, a, b) for a, b, item in pairs if item is not None]
     return doublings
-
-
-def _wanted(doublings: list[tuple[Located, Sample, Sample]], options: AdaptiveHarmonics) -> HarmonicBasis:
-    """The harmonics that located bifurcations are to have."""
-    states = [item.sample.state if item.solution is None else item.solution.state for item, _, _ in doublings]
-    bases = (choose_harmonics(state, options, options.event_tolerance) for state in states)
-    return max(bases, key=lambda basis: basis.harmonics)
 
 
 _MISSED = (
@@ -213,11 +197,11 @@ class DoublingWatch:
             nearest = min(left, key=lambda pair: _distance(pair, place), default=None)
             if nearest is not None and _distance(nearest, place) <= reach:
                 left.remove(nearest)
-        reasons = [_UNSOLVED if self._in_vain(pair) else _MISSED.format(test=self.test) for pair in left]
-        return [(a, b, reason) for (a, b), reason in zip(left, reasons, strict=True)]
-
-    def _in_vain(self, pair: Pair) -> bool:
-        return any(low <= pair[0].place and pair[1].place <= high for low, high in self._tried)
+        reasons = []
+        for a, b in left:
+            in_vain = any(low <= a.place and b.place <= high for low, high in self._tried)
+            reasons.append((a, b, _UNSOLVED if in_vain else _MISSED.format(test=self.test)))
+        return reasons
 
     def forget(self) -> None:
         """What lies behind says nothing of what comes."""

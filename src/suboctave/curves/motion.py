@@ -207,10 +207,6 @@ class MotionProblem:
         """Force that residuals are held against at least: that of a motion at rest."""
         return _REST * omega**2 * self.reference
 
-    @property
-    def _weight(self) -> Array:
-        return self.balance.column_weights
-
     def split(self, u: Array) -> tuple[Array, float, Mapping[str, float]]:
         """Coefficients (2 H + 1, size), omega and parameter values of a vector u."""
         x, own = self.balance.shaped(u[: self.balance.dimension]), self.balance.values
@@ -248,12 +244,12 @@ class MotionProblem:
 
     def size(self, u: Array) -> float:
         """Norm of the coefficients, weighted by the square roots of the masses."""
-        return length(self._weight * u[: self.balance.dimension])
+        return length(self.balance.column_weights * u[: self.balance.dimension])
 
     def weights(self, u: Array, largest: float) -> Array:
         size = max(self.size(u), 0.01 * max(largest, self.reference)) or 1.0
         weights, n = np.empty(len(u)), self.balance.dimension
-        np.divide(self._weight, size, out=weights[:n])
+        np.divide(self.balance.column_weights, size, out=weights[:n])
         if self.augmentation.extras:
             weights[n : -len(self.names)] = 1.0 / self.augmentation.spans(self.split(u)[1] / self.balance.basis.nu)
         for i, span in enumerate(self.spans, len(u) - len(self.names)):
@@ -262,7 +258,7 @@ class MotionProblem:
 
     def unit(self, weights: Array) -> float:
         """Size of a motion that counts as one in `weights`."""
-        return float(self._weight[0] / weights[0])
+        return float(self.balance.column_weights[0] / weights[0])
 
     def adapted(self, u: Array, evaluation: Evaluation) -> MotionProblem:
         """The curve with the harmonics, samples and bordering vectors of this point."""

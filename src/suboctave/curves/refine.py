@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -23,7 +24,6 @@ from suboctave.curves.events.monitors import BRANCH_POINT, BifurcationKind, Loca
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.sample import Sample
 from suboctave.errors import ConvergenceError
-from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.truncation import choose_harmonics, next_harmonics, truncation
 
@@ -48,7 +48,10 @@ def bifurcation_at(located: Located, a: Sample, b: Sample, observe: int, warning
     curve = b.curve
     solution = located.solution
     if solution is None:
-        guess = Guess.at(located.sample.point.u, located.sample.point, _kappa(located))
+        kappa = 0.0
+        with suppress(ConvergenceError):
+            kappa = located.kind.kappa(located.sample)
+        guess = Guess.at(located.sample.point.u, located.sample.point, kappa)
         behind = behind_grazing(located.kind, guess)
         own = behind is not None and _lies_between(behind, curve, a, b)
         # harmonics may move it beyond the ends of a short step, where it may also be another one
@@ -78,14 +81,11 @@ def bifurcation_at(located: Located, a: Sample, b: Sample, observe: int, warning
         )
     unit = curve.unit(located.sample.point.weights)
     item = solved_bifurcation(located.kind, solution, curve, observe, warnings, arclength, unit, (a, b))
-    return replace(item, tangent=_tangent(a, b, located.fraction, item)) if item.kind == "BP" else item
-
-
-def _tangent(a: Sample, b: Sample, share: float, item: Bifurcation) -> tuple[float, ...]:
-    """The direction of the branch at a bifurcation between two samples, in the harmonics of its motion."""
-    curve = b.curve
-    t = (1.0 - share) * curve.transfer(a.point.tangent, a.curve) + share * b.point.tangent
-    return tuple(curve.with_balance(item.orbit.balance).transfer(t, curve).tolist())
+    if item.kind != "BP":
+        return item
+    share = located.fraction
+    tangent = (1.0 - share) * curve.transfer(a.point.tangent, a.curve) + share * b.point.tangent
+    return replace(item, tangent=tuple(curve.with_balance(item.orbit.balance).transfer(tangent, curve).tolist()))
 
 
 def solved_bifurcation(
@@ -101,11 +101,13 @@ def solved_bifurcation(
     """A solved bifurcation with the harmonics that events ask for, labelled; `size` as in `Guess`; `neighbours`: the
     samples it was located between.
     """
-    solution, coarser = _refined(kind, solution, curve, warnings, size, neighbours)
+    own = None if neighbours is None or neighbours[0] is neighbours[1] else neighbours
+    solution, coarser = _refined(kind, solution, curve, warnings, size, own)
     guess = _guess_from(solution, curve, size)
     state = solution.state
     layer = layer_of(kind, solution, guess)
-    orbit = as_orbit(state, solution.balance_residual, truncation(state), curve)
+    known = dict(state.values), solution.balance_residual, truncation(state), curve.adaptive
+    orbit = PeriodicOrbit(state.balance, state.x.copy(), state.omega, *known)
     return Bifurcation(
         kind.name,
         orbit,
@@ -163,16 +165,11 @@ def _with_more_harmonics(located: Located, a: Sample, b: Sample) -> Singular | N
         between = _between(kind, wide, a, b)
         if between is not None:
             return between
-    size = b.point.arclength - a.point.arclength
-    return beyond if beyond is not None and _distance(beyond, located.sample) <= size else None
-
-
-def _distance(solution: Singular, sample: Sample) -> float:
-    """Scaled distance of a solution from a sample, in the harmonics of the sample."""
-    curve = sample.curve
-    wide = curve.with_balance(solution.state.balance)
-    there = curve.transfer(wide.u_of(solution.state), wide)
-    return distance(there, sample.point.u, sample.point.weights)
+    if beyond is None:
+        return None
+    wide = located.sample.curve.with_balance(beyond.state.balance)
+    there, point = located.sample.curve.transfer(wide.u_of(beyond.state), wide), located.sample.point
+    return beyond if distance(there, point.u, point.weights) <= b.point.arclength - a.point.arclength else None
 
 
 def _refined(
@@ -203,8 +200,9 @@ def _refined(
         guess = replace(_guess_from(solution, curve, size), state=start)
         try:
             better = solve_or_behind(kind, guess)
-            if neighbours is not None:
-                better = _of_its_own(kind, better, wide, *neighbours)
+            # beside a young contact Newton's method may run to the next bifurcation of the kind
+            if neighbours is not None and not _lies_between(better, wide, *neighbours):
+                better = _between(kind, wide, *neighbours) or better
         except ConvergenceError as failure:
             warnings.append(
                 f"{kind.name} near omega = {state.omega:.6g} was located with {state.basis.harmonics} "
@@ -221,15 +219,6 @@ def _refined(
         coarser = state.basis.harmonics, _guess_from(solution, curve).parameter
         solution = better
     return solution, coarser
-
-
-def _of_its_own(kind: BifurcationKind, solution: Singular, curve: MotionProblem, a: Sample, b: Sample) -> Singular:
-    """What was solved for with more harmonics, if it still lies between two samples; else what lies between them with
-    these harmonics. Beside a young contact Newton's method may run to the next bifurcation of the kind.
-    """
-    if a is b or _lies_between(solution, curve, a, b):
-        return solution
-    return _between(kind, curve, a, b) or solution
 
 
 def _lies_between(solution: Singular, curve: MotionProblem, a: Sample, b: Sample) -> bool:
@@ -269,18 +258,5 @@ def solved_in(curve: MotionProblem, sample: Sample, newton: NewtonOptions) -> Sa
     return sample.at(solved_again(sample.point, curve, curve.weights(u, 0.0), newton))
 
 
-def as_orbit(state: BalanceState, residual: float, neglected: float, curve: MotionProblem) -> PeriodicOrbit:
-    """A solved state as a periodic motion."""
-    values = dict(state.values)
-    return PeriodicOrbit(state.balance, state.x.copy(), state.omega, values, residual, neglected, curve.adaptive)
-
-
 def _guess_from(solution: Singular, curve: MotionProblem, size: float = 0.0) -> Guess:
     return Guess(solution.state, curve.name, curve.span, solution.kappa, solution.vectors, size)
-
-
-def _kappa(located: Located) -> float:
-    try:
-        return located.kind.kappa(located.sample)
-    except ConvergenceError:
-        return 0.0

@@ -189,20 +189,14 @@ class Settings:
         return replace(self, report=progress)
 
 
-@dataclass(frozen=True)
-class Doubt:
-    """What is in doubt of a bifurcation that was located: the motion there, and the sentence."""
-
-    orbit: PeriodicOrbit
-    text: str
-
-
 @dataclass
 class Trace:
     """What following a curve in one direction gave.
 
     open
         Motions between its points whose verdict is open.
+    doubts
+        Of located bifurcations: the motion there, and a sentence.
     endings
         Why it ends at its first and at its last point.
     departs, arrives
@@ -214,7 +208,7 @@ class Trace:
     bifurcations: list[Bifurcation] = field(default_factory=list)
     events: list[Bifurcation] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
-    doubts: list[Doubt] = field(default_factory=list)
+    doubts: list[tuple[PeriodicOrbit, str]] = field(default_factory=list)
     audit: Audit = field(default_factory=Audit)
     closed: bool = False
     endings: tuple[Ending, Ending] = (Ending(EndReason.START), Ending(EndReason.NOT_STARTED))
@@ -230,7 +224,7 @@ class Trace:
     def sentences(self) -> list[str]:
         """What is to be said of it: a stretch in doubt in one line, doubts of bifurcations that are listed."""
         listed = {id(item.orbit) for item in self.bifurcations}
-        doubts = (doubt.text for doubt in self.doubts if id(doubt.orbit) in listed)
+        doubts = (text for orbit, text in self.doubts if id(orbit) in listed)
         stretches = (f"{u}; {_REMEDY}" for u in self.audit.unsettled)
         return [*self.warnings, *doubts, *stretches]
 
@@ -284,12 +278,10 @@ class Trace:
         """Drop what lies behind a bifurcation, which the trace arrives at."""
         self.points = [p for p in self.points if p.arclength < item.arclength] or self.points[:1]
         end = self.points[-1].arclength
-        self.cut(item.arclength)
-        self.bifurcations = [b for b in self.bifurcations if b.arclength < item.arclength and b is not item]
+        self.bifurcations = [b for b in self.bifurcations if b.arclength < item.arclength]
         self.events = [b for b in self.events if b.arclength < item.arclength]
         self.open = [p for p in self.open if p.arclength < end]
         self.audit = replace(self.audit, unsettled=tuple(u for u in self.audit.unsettled if u.arclength[1] <= end))
         self.closed, self.arrives = False, replace(item, arclength=end)
-        name = item.parameter_name
-        where = f"{name} = {item.parameter(name):.6g}"
+        where = f"{item.parameter_name} = {item.parameter(item.parameter_name):.6g}"
         self.ends(Ending(EndReason.MET_BRANCH, where, f"met the branch that it leaves at the branch point at {where}"))

@@ -19,6 +19,7 @@ import math
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -98,14 +99,12 @@ def end_between(a: Sample, b: Sample, newton: NewtonOptions, lopsided: bool = Tr
     if b.curve.balance.basis.nu == 1:
         return _symmetry_gained(a, b) if lopsided else None
     share = subharmonic_share(b.curve, b.point.u)
-    if share <= _FAINT:
-        parent = _on_the_parent(a, newton)
-        if parent is not None:
-            return _in_the_parent(parent)
-    elif _standing(a, b):
-        parent = _on_the_parent(a, newton)
-        if parent is not None:
-            return _in_the_parent(parent) if _apart(parent.sample.point, b.point) <= 10.0 * _REACHED else None
+    standing = share > _FAINT and _standing(a, b)
+    parent = _on_the_parent(a, newton) if share <= _FAINT or standing else None
+    if parent is not None:
+        near = not standing or _apart(parent.sample.point, b.point) <= 10.0 * _REACHED
+        return _in_the_parent(parent) if near else None
+    if standing:
         return End(
             f"the curve ends on the period doublings of the parent motion beside {b.where}: the "
             "parameters stand still there while the doubled part goes on to vanish, and the GPD was not located"
@@ -150,11 +149,8 @@ def end_ahead(a: Sample, b: Sample, newton: NewtonOptions) -> End | None:
     y is small the equations tell limit points from period doublings of the parent by little, and of little damping by
     nothing; so the end is looked for while they still do, and taken if it lies where the last two points lead.
     """
-    lead = _lead(a, b)
-    if lead is None or subharmonic_share(b.curve, b.point.u) <= NOTHING_LEFT:
-        return None
-    before, size = (doubled_size(sample.curve, sample.point.u) for sample in (a, b))
-    if size > _AHEAD * (before - size):
+    lead, before, size = _lead(a, b)
+    if lead is None or subharmonic_share(b.curve, b.point.u) <= NOTHING_LEFT or size > _AHEAD * (before - size):
         return None
     parent = _on_the_parent(b, newton)
     if parent is None:
@@ -164,28 +160,31 @@ def end_ahead(a: Sample, b: Sample, newton: NewtonOptions) -> End | None:
     return _in_the_parent(parent) if miss <= _LEADS * float(np.linalg.norm(units * lead)) + _REACHED else None
 
 
-def _lead(a: Sample, b: Sample) -> Array | None:
-    """What the parameters still change by until the doubled part of limit points vanishes, if two neighbours lead
-    there; None if they do not, or are others.
+def _lead(a: Sample, b: Sample) -> tuple[Array | None, float, float]:
+    """What the parameters still change by until the doubled part of limit points vanishes, if two neighbours lead there
+    (None if they do not, or are others), and the sizes of that part at both.
     """
-    if b.curve.balance.basis.nu % 2 or b.curve.augmentation.name != "LP" or b.curve.augmentation.turning:
-        return None
+    if b.curve.balance.basis.nu % 2 or not _are_limit_points(b):
+        return None, 0.0, 0.0
     before, size = (doubled_size(sample.curve, sample.point.u) for sample in (a, b))
     if not 0.0 < size < before:
-        return None
-    result: Array = (b.point.u[-2:] - a.point.u[-2:]) * size**2 / (before**2 - size**2)
-    return result
+        return None, before, size
+    return (b.point.u[-2:] - a.point.u[-2:]) * size**2 / (before**2 - size**2), before, size
+
+
+def _are_limit_points(sample: Sample) -> bool:
+    augmentation = sample.curve.augmentation
+    return augmentation.name == "LP" and not augmentation.turning
 
 
 def _in_the_parent(parent: LocatedEvent) -> End:
-    where = parent.sample.where
-    reason = f"the curve ends on the period doublings of the parent motion, in a GPD at {where}"
+    reason = f"the curve ends on the period doublings of the parent motion, in a GPD at {parent.sample.where}"
     return End(reason, parent, last=True)
 
 
 def _symmetry_gained(a: Sample, b: Sample) -> End | None:
     """The end of a curve of limit points whose motions become symmetric, x(t + T / 2) = -x(t)."""
-    if b.curve.augmentation.name != "LP" or b.curve.augmentation.turning:
+    if not _are_limit_points(b):
         return None
     before, share = (_unsymmetric_share(sample.state) for sample in (a, b))
     if share > _FAINT or share >= before or before <= _NO_PARITY:
@@ -233,12 +232,11 @@ def _apart(one: CurvePoint, other: CurvePoint) -> float:
 
 def _standing(a: Sample, b: Sample) -> bool:
     """Whether the doubled part of limit points goes on to vanish while the parameters have come to their end."""
-    units, lead = b.point.weights[-2:], _lead(a, b)
+    units, (lead, before, size) = b.point.weights[-2:], _lead(a, b)
     speed = float(np.linalg.norm(units * b.point.tangent[-2:]))
     if lead is None or speed > _STANDING or float(np.linalg.norm(units * lead)) > _REACHED:
         return False
     # the same by the tangent: two points may agree by chance, to what residuals tell
-    before, size = (doubled_size(sample.curve, sample.point.u) for sample in (a, b))
     return 0.5 * speed * size * (b.point.arclength - a.point.arclength) <= _REACHED * (before - size)
 
 
@@ -262,19 +260,18 @@ def _split(b: Sample) -> bool:
 def _resonance(a: Sample, double: bool, newton: NewtonOptions) -> End:
     """The 1:1 or 1:2 resonance in which an NS curve ends, located on the LP, BP or PD curve through it."""
     order = 2 if double else 1
-    words = f"1:{order}"
+    ends = f"the curve ends in a 1:{order} resonance"
     if a.curve.augmentation.turning:
-        return End(f"the curve ends in a {words} resonance beyond {a.where}")
+        return End(f"{ends} beyond {a.where}")
     balance, name = a.curve.balance, a.curve.names[0]
     state = balance.at(a.state.x, a.state.omega, a.state.values)
     # limit points of motions with a symmetry may be branch points, where the equations of limit points are singular
     singled_out: list[Callable[[], Augmentation]] = [
-        lambda: SingularOperator.of(state, Kind.HALF if double else Kind.INTEGER)
+        partial(SingularOperator.of, state, Kind.HALF if double else Kind.INTEGER),
+        partial(BranchPointUnfolded.of, state, name),
     ]
-    if not double:
-        singled_out.append(lambda: BranchPointUnfolded.of(state, name))
     failures = []
-    for augmentation in singled_out:
+    for augmentation in singled_out[: 1 if double else 2]:
         try:
             curve = replace(a.curve, augmentation=augmentation())
             event = _zero_beside(a, curve, a.state.x, DoubleMultiplier(f"R{order}"), newton, _AROUND)
@@ -282,15 +279,14 @@ def _resonance(a: Sample, double: bool, newton: NewtonOptions) -> End:
         except ConvergenceError as failure:
             failures.append(str(failure))
     else:
-        return End(f"the curve ends in a {words} resonance beyond {a.where} ({failures[0]})")
-    where = event.sample.where
-    return End(f"the curve ends in a {words} resonance at {where}", event, last=True)
+        return End(f"{ends} beyond {a.where} ({failures[0]})")
+    return End(f"{ends} at {event.sample.where}", event, last=True)
 
 
 def _on_the_parent(a: Sample, newton: NewtonOptions) -> LocatedEvent | None:
     """The GPD beside a faint LP of doubled motions, on the PD curve of the parent; None if there is none."""
     basis = a.curve.balance.basis
-    if a.curve.augmentation.name != "LP" or a.curve.augmentation.turning or basis.nu % 2:
+    if not _are_limit_points(a) or basis.nu % 2:
         return None
     x = basis.even_part(a.state.x)
     try:

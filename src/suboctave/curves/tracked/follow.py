@@ -75,25 +75,23 @@ class _Tracker(Driver):
     def _walk(self) -> None:
         trace = self.trace
         while True:
-            ending = self._march()
+            stop = next((stop for point in self.march if (stop := self._accept(point)) is not None), None)
+            ending = stop or self.march.ending
             trace.ends(ending)
             beyond = self._beyond_corner() if ending.reason is EndReason.STEP_TOO_SMALL else None
             if beyond is None:
                 break
             self.march = self._marching(beyond)
         trace.closed = self.march.closed
-        self._say_doubts()
+        if self.doubtful:
+            trace.warnings.append(
+                f"at {len(self.doubtful)} of {self.compared} points whose multipliers were computed the critical one "
+                f"is missed by more than {_DOUBTFUL:g}, first at {self.doubtful[0]}: more harmonics are needed there, "
+                "or the motion is so unstable that its multipliers cannot be told"
+            )
 
     def _finish(self) -> None:
         self.trace.bifurcations.sort(key=lambda event: event.arclength)
-
-    def _march(self) -> Ending:
-        """Take in points until the curve ends; why it does."""
-        for point in self.march:
-            stop = self._accept(point)
-            if stop is not None:
-                return stop
-        return self.march.ending
 
     def _beyond_corner(self) -> CurvePoint | None:
         """A point behind a corner that the steps could not get around, None if there is none."""
@@ -108,7 +106,7 @@ class _Tracker(Driver):
         point, note = corner
         if note not in self.trace.warnings:
             self.trace.warnings.append(note)
-        if point is None or not self._inside(Sample(point)):
+        if point is None or not all(bounds.low <= bounds.value(point) <= bounds.high for bounds in self.others):
             return None
         self._turn_at_corner(last, point)
         return point
@@ -211,14 +209,6 @@ class _Tracker(Driver):
             violent = np.abs(evaluation.floquet.multipliers).max() > _VIOLENT
             self.untold = self.untold + 1 if doubtful and violent else 0
 
-    def _say_doubts(self) -> None:
-        if self.doubtful:
-            self.trace.warnings.append(
-                f"at {len(self.doubtful)} of {self.compared} points whose multipliers were computed the critical one "
-                f"is missed by more than {_DOUBTFUL:g}, first at {self.doubtful[0]}: more harmonics are needed there, "
-                "or the motion is so unstable that its multipliers cannot be told"
-            )
-
     def _take_end(self, a: Sample, end: End) -> None:
         settings = self.settings
         for b in points_before(end, a, settings.newton):
@@ -255,7 +245,3 @@ class _Tracker(Driver):
             return b
         chord = point.u - b.curve.transfer(a.point.u, a.curve)
         return Sample(replace(point, tangent=chord / length(point.weights * chord)))
-
-    def _inside(self, sample: Sample) -> bool:
-        """Whether a point lies in the ranges of the parameters but the last."""
-        return all(bounds.low <= bounds.value(sample.point) <= bounds.high for bounds in self.others)

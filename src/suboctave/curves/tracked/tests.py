@@ -328,8 +328,8 @@ _OF_MOTIONS = (
     RealCrossing("PD", Kind.HALF),
     PairCrossing("NS"),
 )
-#: on curves of bifurcations, from the third on of several DOFs: one has two multipliers with a positive product, of which
-#: none is left that could pass +1 or -1, or be one of a pair
+#: on curves of bifurcations; the first two for one DOF, which has two multipliers with a positive product: none is left
+#: that could pass +1 or -1, or be one of a pair
 _OF_BIFURCATIONS: dict[Kind, tuple[CurveTest, ...]] = {
     Kind.INTEGER: (Cusp(), DoubleMultiplier("R1"), RealCrossing("LPPD", Kind.HALF), PairCrossing("LPNS")),
     Kind.HALF: (
