@@ -22,7 +22,7 @@ from suboctave.continuation.linear import length
 from suboctave.continuation.problem import Array
 from suboctave.curves.events.locate import Singular
 from suboctave.curves.follow import both_ways, follow, same_event
-from suboctave.curves.junction import UNSEEN, beside, curvature_of, doubled, emanating, period_name
+from suboctave.curves.junction import UNSEEN, beside, curvature_of, emanating, period_name
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.starts import Harmonics, harmonics_of, own_linear_part, start_point
 from suboctave.curves.trace import BranchPoint, Settings, Trace
@@ -412,7 +412,8 @@ def _away(
     weights = curve.weights(u, 0.0)
     x, omega, values = curve.split(u)
     curve = curve.with_balance(curve.balance.settle(x, omega, values))
-    expected = doubled(item.floquet) if item.kind == "PD" else item.floquet.multipliers
+    # over the period of the branch
+    expected = item.floquet.multipliers ** (2 if item.kind == "PD" else 1)
     leads = curvature_of(item.normal_form)
     close = beside(curve, u, direction / length(weights * direction), weights, expected, settings.newton, leads)
     if close is None:

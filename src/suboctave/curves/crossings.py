@@ -36,13 +36,8 @@ def first_doubtful(places: Sequence[float], tests: Sequence[Array], at: int) -> 
     """The first of several functions of which a zero may hide between `places[at]` and `places[at + 1]`, and where, as
     a fraction of the interval, not too close to its ends, so that both parts shrink; None if none is in doubt.
 
-    Parameters
-    ----------
-    places
-        Three to six different places in ascending order, up to two on either side of the interval.
-    tests
-        At every place the functions' signs and logarithms of moduli, shape (2, m). The side of an exact zero is the
-        caller's business.
+    Three to six different places ascend, up to two on either side of the interval; `tests` has at every place the
+    functions' signs and logarithms of moduli, (2, m). The side of an exact zero is the caller's business.
     """
     k, share = _first_doubtful(np.array(places), np.array(tests), at)
     return None if share < 0.0 else (k, min(0.6, max(0.4, share)))

@@ -65,13 +65,8 @@ class Crossing:
 class StepGuard(Steps):
     """Examines the steps along one curve.
 
-    Parameters
-    ----------
-    solve
-        Gives the sample at a fraction of the way between two neighbours, about as exactly as rounding allows where that
-        is asked for; may raise ConvergenceError.
-    branch_point
-        The branch point between two samples of different orientation, None if there is none.
+    `solve` gives the sample at a fraction of the way between two neighbours, about as exactly as rounding allows where
+    that is asked for (may raise ConvergenceError); `branch_point` the one between two samples of different orientation.
     """
 
     def __init__(
@@ -235,15 +230,13 @@ class GuardedStep(Interior):
 
 
 _RETURNS = "a multiplier may pass +1 and come back"
+_BESIDE = "the branch turns back beside a branch point, too close to tell where"
 _REASONS = (
     "the branch may turn back and turn again",
     _RETURNS,
     "a multiplier may pass -1 and come back",
     "a pair of multipliers may leave the unit circle and come back",
 )
-
-
-_BESIDE = "the branch turns back beside a branch point, too close to tell where"
 
 
 def _open(p: Sample, q: Sample) -> bool:
@@ -261,19 +254,14 @@ def _disagreement(a: CurvePoint, b: CurvePoint) -> float:
 
 def _explained(p: Sample, q: Sample) -> bool:
     """Whether the tests that change across an interval explain how the number of unstable multipliers changes."""
-    change = abs(p.unstable - q.unstable)
-    kinds = changes(p, q)
-    if change == 0 and not kinds:
+    change, changed = abs(p.unstable - q.unstable), {kind.name for kind in changes(p, q)}
+    if (change == 0 and not changed) or _open(p, q):
         return True
-    if _open(p, q):
-        return True
-    changed = {kind.name for kind in kinds}
     if {"LP", "BP"} <= changed:
         # at a pitchfork the bifurcating branch turns back and is its own mirror image beyond
         return change <= 2 + ("PD" in changed) + 2 * ("NS" in changed)
     single = len(changed & {"LP", "BP", "PD"})
-    most = single + 2 * ("NS" in changed)
-    return change <= most and (change - single) % 2 == 0
+    return change <= single + 2 * ("NS" in changed) and (change - single) % 2 == 0
 
 
 def _mixed(p: Sample, q: Sample) -> bool:
@@ -281,9 +269,7 @@ def _mixed(p: Sample, q: Sample) -> bool:
 
     Its product changes sign there (and where two real ones are each other's inverses): alone the count tells which.
     """
-    if p.measures[0, -1] == q.measures[0, -1]:
-        return False
-    return any(kind is not NEIMARK_SACKER for kind in changes(p, q))
+    return p.measures[0, -1] != q.measures[0, -1] and any(kind is not NEIMARK_SACKER for kind in changes(p, q))
 
 
 def _movement(old: ComplexArray, new: ComplexArray) -> float:

@@ -31,7 +31,6 @@ from suboctave.curves.identity import apart
 from suboctave.curves.motion import MotionProblem
 from suboctave.errors import ConvergenceError
 from suboctave.floquet.monodromy import floquet_multipliers
-from suboctave.floquet.result import FloquetResult
 from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.perturbation import Kind
@@ -58,9 +57,8 @@ def subharmonic_share(curve: MotionProblem, u: Array) -> float:
 def parts_of(curve: MotionProblem, u: Array) -> list[Array]:
     """Harmonics that the motion would not have if it repeated earlier: one array for each prime factor of nu."""
     basis = curve.balance.basis
-    nu = basis.nu
     x = u[: curve.balance.dimension].reshape(basis.size, -1) * curve.balance.scales()[0]
-    return [x[rows].ravel() for rows in _rows_of_parts(nu, basis.harmonics)]
+    return [x[rows].ravel() for rows in _rows_of_parts(basis.nu, basis.harmonics)]
 
 
 def repeats_earlier(orbit: PeriodicOrbit) -> bool:
@@ -210,7 +208,9 @@ def _last_before(
         direction = -direction
     assert doubling.vectors is not None
     form = normal_form("PD", doubling.state, doubling.vectors, curve.name)
-    close = beside(curve, there, direction, b.weights, doubled(doubling.floquet), newton, curvature_of(form), 0.7 * way)
+    # over twice the period
+    multipliers = doubling.floquet.multipliers**2
+    close = beside(curve, there, direction, b.weights, multipliers, newton, curvature_of(form), 0.7 * way)
     if close is None:
         return None, f"between {a.curve.where(a.u)} and {curve.where(there)}"
     point = close.point
@@ -251,18 +251,11 @@ def beside(
 
     On the way the critical multiplier leaves +1, and the parameter its value, with the square of the distance. Where
     the point's multipliers are not those of the bifurcation, or the parameter goes another way, something else happens
-    in between: then one closer to it is taken.
+    in between: then one closer to it is taken, none farther than `reach`.
 
-    Parameters
-    ----------
-    u, direction
-        The bifurcation, and where the curve leaves it, of unit length in `weights`.
-    multipliers
-        Of the motion at u, over the period of the curve's motions.
-    curvature
-        Which way the parameter goes, by its sign, where a normal form tells.
-    reach
-        Distance that the point must not exceed.
+    u, `direction`: the bifurcation, and where the curve leaves it, of unit length in `weights`; `multipliers` of the
+    motion there over the period of the curve's motions; `curvature`: which way the parameter goes, by its sign, where a
+    normal form tells.
     """
     points: list[tuple[float, CurvePoint]] = []
     for distance in _DISTANCES:
@@ -290,8 +283,7 @@ def _near(point: CurvePoint, multipliers: ComplexArray) -> bool:
     """Whether a point has multipliers close to given ones."""
     curve = point.curve
     assert isinstance(curve, MotionProblem)
-    x, omega, values = curve.split(point.u)
-    own = np.sort_complex(floquet_multipliers(curve.balance.at(x, omega, values)).multipliers)
+    own = np.sort_complex(floquet_multipliers(curve.balance.at(*curve.split(point.u))).multipliers)
     expected = np.sort_complex(multipliers)
     return float((np.abs(own - expected) / np.maximum(1.0, np.abs(expected))).max()) <= _CLOSE
 
@@ -314,9 +306,3 @@ def curvature_of(form: NormalForm | None) -> float | None:
     if form is None or form.criticality is None:
         return None
     return form.coefficients.get("curvature")
-
-
-def doubled(result: FloquetResult) -> ComplexArray:
-    """Multipliers over twice the period."""
-    squared: ComplexArray = result.multipliers**2
-    return squared

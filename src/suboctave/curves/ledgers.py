@@ -149,16 +149,9 @@ Pair = tuple[Sample, Sample]
 
 @dataclass
 class DoublingWatch:
-    """Follows a curve with one published test function.
+    """Follows a curve with one published test function: "multiplier" or "determinant".
 
-    Parameters
-    ----------
-    test
-        "multiplier" or "determinant".
-    kind
-        Period doubling, with the formulation that solves for it.
-    locate
-        Solves between two samples; None if there is none.
+    `kind`: period doubling, with the formulation that solves for it; `locate` solves between two samples.
     """
 
     test: str

@@ -109,19 +109,20 @@ _UNBOUNDED = 1e4
 
 def linear_response(curve: MotionProblem, value: float) -> Array:
     """u of the response without elements, at a value of the free parameter."""
-    balance = curve.balance
-    zero = np.zeros((balance.basis.size, balance.size))
-    x, omega, values = curve.split(curve.join(zero, value))
-    state = balance.at(x, omega, values)
-    load = balance.load(values, omega)
-    if state.compliance is not None:
-        load = apply_blocks(state.compliance, load)
+    state = curve.balance.at(*curve.split(curve.join(np.zeros(curve.balance.dimension), value)))
+    load = _load(state)
     try:
         inverse = np.linalg.inv(state.blocks).astype(complex)
     except np.linalg.LinAlgError:
         # a free body or an undamped resonance: the least motion that balances what can be balanced
         inverse = np.linalg.pinv(state.blocks).astype(complex)
     return curve.join(apply_blocks(inverse, load), value)
+
+
+def _load(state: BalanceState) -> Array:
+    """P, through the compliance of a condensed structure."""
+    load = state.balance.load(state.values, state.omega)
+    return load if state.compliance is None else apply_blocks(state.compliance, load)
 
 
 def start_point(curve: MotionProblem, value: float, given: Any, newton: NewtonOptions) -> CurvePoint:
@@ -156,10 +157,10 @@ def start_point(curve: MotionProblem, value: float, given: Any, newton: NewtonOp
     patient = replace(newton, iterations=max(newton.iterations, 40), damped=True)
     ways: list[tuple[str, Callable[[], tuple[MotionProblem, Array]]]] = []
     for finer in _with_more_harmonics(curve):
-        kept = _like(finer, None, finer.reference)
+        kept, count = _like(finer, None, finer.reference), finer.balance.basis.harmonics
         ways += [
-            (f"linear response with {finer.balance.basis.harmonics} harmonics", partial(_linear, finer, value)),
-            (f"{_PATH} with {finer.balance.basis.harmonics}", partial(_released, kept, value, newton)),
+            (f"linear response with {count} harmonics", partial(lambda c: (c, linear_response(c, value)), finer)),
+            (f"{_PATH} with {count}", partial(_released, kept, value, newton)),
         ]
     if curve.adaptive is not None:
         ways.append((f"{_PATH} with as many as it needs", partial(_released, curve, value, newton)))
@@ -182,11 +183,10 @@ def start_point(curve: MotionProblem, value: float, given: Any, newton: NewtonOp
 
 def _unheld(curve: MotionProblem, u: Array) -> str | None:
     """What may move freely beside a motion, in words; None if nothing may."""
-    x, omega, values = curve.split(u)
-    state = curve.balance.at(x, omega, values)
+    state = curve.balance.at(*curve.split(u))
     weights = curve.balance.row_weights(curve.balance.dimension)
     _, sizes, rows = np.linalg.svd(state.jacobian * weights[:, None] * weights)
-    if sizes[-1] > _FREE * omega**2:
+    if sizes[-1] > _FREE * state.omega**2:
         return None
     loose = curve.balance.shaped(rows[-1])
     mean = length(loose[0])
@@ -197,10 +197,6 @@ def _unheld(curve: MotionProblem, u: Array) -> str | None:
         f": nothing holds DOF {dof}, whose mean position is arbitrary there (it floats between its stops, or has no "
         "stiffness). Give it a small stiffness, or a load that reaches a stop"
     )
-
-
-def _linear(curve: MotionProblem, value: float) -> tuple[MotionProblem, Array]:
-    return curve, linear_response(curve, value)
 
 
 def _with_more_harmonics(curve: MotionProblem) -> Iterator[MotionProblem]:
@@ -279,7 +275,7 @@ def _integrated(curve: MotionProblem, value: float, state: Array) -> Array:
     balance = curve.balance
     if balance.size != balance.system.n:
         raise ConvergenceError("time integration needs the full system, not a condensed one")
-    _, omega, values = curve.split(curve.join(np.zeros((balance.basis.size, balance.size)), value))
+    _, omega, values = curve.split(curve.join(np.zeros(balance.dimension), value))
     samples = 8 * balance.basis.harmonics + 8
     times = np.linspace(0.0, 2.0 * math.pi * balance.basis.nu / omega, samples + 1)
     trajectory = integrate(balance.system, state, times, omega, values, rtol=1e-6)
@@ -296,30 +292,19 @@ class _HeldEvaluation(MotionEvaluation):
         self.hold = hold
 
     @lazy
-    def _load(self) -> Array:
-        state = self.state
-        load = state.balance.load(state.values, state.omega)
-        if state.compliance is not None:
-            load = apply_blocks(state.compliance, load)
-        return load.ravel()
-
-    @lazy
     def _rate(self) -> Array:
-        return self.state.residual + self._load - self.hold @ self.state.unknowns
+        return self.state.residual + _load(self.state).ravel() - self.hold @ self.state.unknowns
 
     @lazy
     def residual(self) -> Array:
-        """See above, shape (N,)."""
         return self.state.residual - (1.0 - self.share) * self._rate
 
     @lazy
     def jacobian(self) -> Array:
-        """Derivatives by X and by the share."""
         return np.column_stack((self.share * self.state.jacobian + (1.0 - self.share) * self.hold, self._rate))
 
     @lazy
     def error(self) -> float:
-        """Residual in units of the forces that balance."""
         balance = self.state.balance
         size = length(self.residual * balance.row_weights(balance.dimension))
         return size / max(self.state.balanced.scale, np.finfo(float).tiny)
@@ -343,9 +328,7 @@ class _Held(MotionProblem):
     @lazy
     def rest(self) -> BalanceState:
         """The system at rest."""
-        zero = np.zeros((self.balance.basis.size, self.balance.size))
-        x, omega, values = self.split(self.join(zero, self.value))
-        return self.balance.at(x, omega, values)
+        return self.balance.at(*self.split(self.join(np.zeros(self.balance.dimension), self.value)))
 
     @lazy
     def hold(self) -> Array:

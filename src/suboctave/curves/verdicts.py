@@ -8,7 +8,7 @@ is the reason: there a multiplier has to be on the circle.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import groupby
 
@@ -30,14 +30,8 @@ _PATIENCE = 3
 
 
 def with_verdicts(trace: Trace, method: StabilityMethod, name: str) -> Trace:
-    """A trace whose open verdicts were asked of a method, and that says what stayed open.
-
-    Parameters
-    ----------
-    method
-        The one whose `along` gave the multipliers of the trace's points.
-    name
-        The free parameter.
+    """A trace whose open verdicts were asked of the method whose `along` gave the multipliers of its points, and that
+    says what stayed open; `name`: the free parameter.
     """
     asking = _Asking(method, not trace.interrupted)
     # right beside another branch a multiplier is as near +1 as one likes
@@ -56,11 +50,19 @@ def with_verdicts(trace: Trace, method: StabilityMethod, name: str) -> Trace:
         # what lies at the seam lies at both ends
         whole = points[-1].arclength
         known += [replace(item, arclength=item.arclength + way) for item in bifurcations for way in (-whole, whole)]
-    open_ones = [i for run in _runs(in_doubt) for i in _unexpected(run, points, known)]
+    open_ones = [
+        i
+        for first, last in _runs(in_doubt)
+        for i in range(first, last + 1)
+        if not _explained(points[i].floquet, points[max(first - 1, 0) : last + 2], known)
+    ]
     unsettled, notes = _stretches(points, open_ones, name)
     for probe in trace.open:
         stretch = _between(probe, points, known, name)
-        if stretch is not None and not any(_within(stretch, other) for other in (*trace.audit.unsettled, *unsettled)):
+        if stretch is None:
+            continue
+        first, last = stretch.arclength
+        if not any(first <= u.arclength[1] and u.arclength[0] <= last for u in (*trace.audit.unsettled, *unsettled)):
             unsettled.append(stretch)
     notes += [note for item in bifurcations if (note := _doubt_beside(item)) is not None]
     notes += _replaced(points, method, name)
@@ -82,23 +84,14 @@ class _Asking:
         self.going_on = whole
         self.interruption: Interruption | None = None
 
-    def settled(self, state: BalanceState, result: FloquetResult) -> FloquetResult:
-        """The verdict where one is open, with witnesses."""
-        return self._answer(
-            lambda: in_doubt(
-                self.method.settled(state, result), Factor.of(state.jacobian).sign, Factor.of(state.half_jacobian).sign
-            ),
-            result,
-        )
-
-    def along(self, state: BalanceState, result: FloquetResult) -> FloquetResult:
-        """The method's multipliers in place of others."""
-        return self._answer(lambda: self.method.along(state), result)
-
-    def _answer(self, question: Callable[[], FloquetResult], known: FloquetResult) -> FloquetResult:
+    def answer(self, state: BalanceState, known: FloquetResult, settle: bool = True) -> FloquetResult:
+        """The verdict where one is open, with witnesses; or the method's multipliers in place of others."""
         if self.going_on:
             try:
-                return question()
+                if not settle:
+                    return self.method.along(state)
+                signs = Factor.of(state.jacobian).sign, Factor.of(state.half_jacobian).sign
+                return in_doubt(self.method.settled(state, known), *signs)
             except KeyboardInterrupt as cause:
                 self.interruption, self.going_on = Interruption.of(cause), False
         return known
@@ -112,7 +105,7 @@ def _settled(points: Sequence[BranchPoint], asking: _Asking, beside: set[int]) -
         if result.decided:
             in_vain = 0
         elif number not in beside and in_vain < _PATIENCE:
-            result = asking.settled(point.orbit.state(), result)
+            result = asking.answer(point.orbit.state(), result)
             in_vain = 0 if result.decided else in_vain + 1
         settled.append(point if result is point.floquet else replace(point, known=result))
     return settled
@@ -129,9 +122,9 @@ def _at_event(item: Bifurcation, asking: _Asking) -> Bifurcation:
         return item
     state = item.orbit.state()
     if not monodromy:
-        result = asking.along(state, result)
+        result = asking.answer(state, result, settle=False)
     if _others_open(replace(item, floquet=result)).any():
-        result = asking.settled(state, result)
+        result = asking.answer(state, result)
     return replace(item, floquet=result)
 
 
@@ -167,19 +160,9 @@ def _doubt_beside(item: Bifurcation) -> str | None:
     )
 
 
-def _unexpected(
-    run: tuple[int, int], points: Sequence[BranchPoint], bifurcations: Sequence[Bifurcation]
-) -> Iterator[int]:
-    """Those of a run of points with open verdicts that no bifurcation located in it or at its ends is the reason of."""
-    first, last = run
-    reach = points[max(first - 1, 0)].arclength, points[min(last + 1, len(points) - 1)].arclength
-    return (i for i in range(first, last + 1) if not _explained(points[i].floquet, reach, bifurcations))
-
-
-def _explained(result: FloquetResult, reach: tuple[float, float], bifurcations: Sequence[Bifurcation]) -> bool:
-    """Whether a bifurcation within a range of arclength is why a multiplier lies within its error of the circle."""
-    first, last = reach
-    near = {item.kind for item in bifurcations if first <= item.arclength <= last}
+def _explained(result: FloquetResult, points: Sequence[BranchPoint], bifurcations: Sequence[Bifurcation]) -> bool:
+    """Whether a bifurcation on the way along some points is why a multiplier lies within its error of the circle."""
+    near = {item.kind for item in bifurcations if points[0].arclength <= item.arclength <= points[-1].arclength}
     within = _open(result)
     mu, errors = result.multipliers[within], result.errors[within]
     explained = np.zeros(len(mu), dtype=bool)
@@ -251,16 +234,10 @@ def _between(
         first -= 1
     while last < len(points) - 1 and not points[last].floquet.decided:
         last += 1
-    reach = points[max(first - 1, 0)].arclength, points[min(last + 1, len(points) - 1)].arclength
-    if _explained(result, reach, bifurcations):
+    if _explained(result, points[max(first - 1, 0) : last + 2], bifurcations):
         return None
     words = f"{_worst(result)} at {name} = {_value(probe, name):.9g}, comes within its error of the unit circle"
     return _stretch(points[low], points[high], name, f"a multiplier, {words} and may pass it")
-
-
-def _within(stretch: Unsettled, known: Unsettled) -> bool:
-    """Whether a stretch has something of another."""
-    return stretch.arclength[0] <= known.arclength[1] and known.arclength[0] <= stretch.arclength[1]
 
 
 def _runs(places: Sequence[int]) -> Iterator[tuple[int, int]]:

@@ -25,6 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from suboctave.bifurcation.gaps import (
+    GapExtrema,
     GrazingContact,
     basis_rows,
     contact_side,
@@ -79,9 +80,8 @@ class Touch(BifurcationKind):
         self.above = above
 
     def changed(self, a: Sample, b: Sample) -> bool:
-        return any(
-            (t.element, t.index, t.maximum) == (self.element, self.index, self.maximum) for t in touches(a, b)[0]
-        )
+        own = self.element, self.index, self.maximum
+        return any((t.element, t.index, t.maximum) == own for t in touches(a, b)[0])
 
     def fraction(self, a: Sample, b: Sample) -> float:
         return self.share
@@ -110,27 +110,36 @@ class Touch(BifurcationKind):
 
     def solve(self, guess: Guess) -> Grazing:
         """Newton's method for the grazing from the nearest extremum of the guess's motion; raises ConvergenceError."""
+        nearest = nearest_extremum(guess.state, self.element, self.index, self.tau, self.maximum)
+        if nearest is None:
+            raise ConvergenceError("the motion has no extremum here")
         augmentation = GrazingContactEquations.of(guess.state, self.element, self.index)
-        evaluation, iterations = solve(guess, augmentation, np.array([self._nearest(guess.state)]))
+        evaluation, iterations = solve(guess, augmentation, nearest[0].tau[[nearest[1]]])
         tau = float(evaluation.extra[0]) % (2.0 * math.pi)
         return Grazing(evaluation.state, None, 0.0, evaluation.error, iterations, tau)
 
     def rise(self, solution: Grazing, name: str) -> Array:
         """Gradient of the extremum's height over the gap by coefficients and free parameter, shape (dimension + 1,)."""
-        state = solution.state
-        value = basis_rows(state.basis.harmonics, solution.tau)[0]
-        direction = read_direction(state, self.element)
-        by_x = np.multiply.outer(value, direction).ravel()
-        return np.append(by_x, -level_rate(state, self.element, self.index, name))
+        return np.append(*height_gradient(solution.state, self.element, self.index, solution.tau, (name,)))
 
-    def _nearest(self, state: BalanceState) -> float:
-        """The instant of the extremum of the right kind nearest to tau."""
-        for gap in gap_extrema(state):
-            if (gap.element, gap.index) == (self.element, self.index):
-                candidates = gap.tau[(gap.curve < 0.0) == self.maximum]
-                if candidates.size:
-                    return float(candidates[np.argmin(1.0 - np.cos(candidates - self.tau))])
-        raise ConvergenceError("the motion has no extremum here")
+
+def height_gradient(
+    state: BalanceState, element: int, index: int, tau: float, names: tuple[str, ...]
+) -> tuple[Array, Array]:
+    """Gradient of an extremum's height over a gap by coefficients, (2 H + 1, size), and by free parameters."""
+    by_x = np.multiply.outer(basis_rows(state.basis.harmonics, tau)[0], read_direction(state, element))
+    return by_x, np.array([-level_rate(state, element, index, name) for name in names])
+
+
+def nearest_extremum(
+    state: BalanceState, element: int, index: int, tau: float, maximum: bool
+) -> tuple[GapExtrema, int] | None:
+    """The maximum or minimum of a gap's relative displacement nearest to an instant: its gap, and which it is there."""
+    for gap in gap_extrema(state):
+        alike = np.flatnonzero((gap.curve < 0.0) == maximum) if (gap.element, gap.index) == (element, index) else None
+        if alike is not None and alike.size:
+            return gap, int(alike[np.argmin(1.0 - np.cos(gap.tau[alike] - tau))])
+    return None
 
 
 def touches(a: Sample, b: Sample) -> tuple[list[Touch], bool]:

@@ -70,11 +70,9 @@ def layer_of(kind: BifurcationKind, solution: Singular, guess: Guess) -> Grazing
 
 def grazing_beside(guess: Guess) -> GrazingContact | None:
     """The grazing at a motion where a bifurcation could only be bracketed, if there is one that near."""
-    near = _beside(guess, _BRACKETED)
-    if not near:
-        return None
-    touch, grazing, distance = near[0]
-    return replace(touch.contact(grazing, guess.name), change="", distance=distance)
+    for touch, grazing, distance in _beside(guess, _BRACKETED)[:1]:
+        return replace(touch.contact(grazing, guess.name), change="", distance=distance)
+    return None
 
 
 def behind_grazing(kind: BifurcationKind, guess: Guess) -> Singular | None:
@@ -134,12 +132,12 @@ def behind_their_grazings(located: list[tuple[float, Bifurcation]]) -> list[Bifu
     """
     result = []
     for place, item in located:
-        fraction, contact = place, item.contact
+        fraction, contact = place, None if item.kind in CONTACT_KINDS else item.contact
         grazings = [
             (at, other, other.contact)
             for at, other in located
-            if contact is not None and item.kind not in CONTACT_KINDS and other.kind in CONTACT_KINDS
-            if other.contact is not None and other.contact.element == contact.element and abs(at - place) < 0.1
+            if contact is not None and other.contact is not None and other.kind in CONTACT_KINDS
+            if other.contact.element == contact.element and abs(at - place) < 0.1
         ]
         if grazings:
             at, grazing, its = min(grazings, key=lambda entry: abs(entry[0] - place))
@@ -162,7 +160,7 @@ def _starts(touch: Touch, grazing: Grazing, guess: Guess) -> Iterator[Guess]:
     state, here = grazing.state, replace(guess, state=grazing.state)
     weights = _weights(state, guess)
     dimension = state.balance.dimension
-    rows = state.balance.row_weights(state.balance.dimension) / max(state.balanced.scale, np.finfo(float).tiny)
+    rows = state.balance.row_weights(dimension) / max(state.balanced.scale, np.finfo(float).tiny)
     matrix = np.zeros((dimension + 1, dimension + 1), order="F")
     matrix[:-1, :-1] = state.jacobian * rows[:, None] / weights[:-1]
     matrix[:-1, -1] = state.residual_by(guess.name) * rows / weights[-1]
@@ -172,9 +170,7 @@ def _starts(touch: Touch, grazing: Grazing, guess: Guess) -> Iterator[Guess]:
     if factor.singular:
         return
     # along it the extremum rises through the gap at a rate of one: an excursion is a maximum above, a minimum below
-    unit = np.zeros(dimension + 1)
-    unit[-1] = 1.0
-    tangent = factor.solve(unit)
+    tangent = factor.solve(np.eye(1, dimension + 1, dimension)[0])
     tangent *= (1.0 if touch.maximum else -1.0) / np.linalg.norm(tangent)
     for way in _STARTS:
         yield here.moved(guess.vector(state) + way * tangent / weights)

@@ -22,6 +22,7 @@ import math
 import weakref
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -147,11 +148,11 @@ class NeimarkSacker(BifurcationKind):
     def _pair(a: Sample, b: Sample) -> tuple[complex, complex] | None:
         """The complex pair of multipliers that crosses: its members at a and b."""
         outside, inside = (a, b) if a.unstable > b.unstable else (b, a)
-        candidates = [mu for mu in outside.floquet.multipliers if mu.imag > 1e-9 * abs(mu) and abs(mu) > 1.0]
-        partners = [mu for mu in inside.floquet.multipliers if mu.imag > 1e-9 * abs(mu) and abs(mu) <= 1.0]
+        candidates = [mu for mu in _pairs(outside) if abs(mu) > 1.0]
+        partners = [mu for mu in _pairs(inside) if abs(mu) <= 1.0]
         if not (candidates and partners):
             return None
-        out, partner = min(((m, p) for m in candidates for p in partners), key=lambda pair: abs(pair[0] - pair[1]))
+        out, partner = min(product(candidates, partners), key=lambda pair: abs(pair[0] - pair[1]))
         with np.errstate(divide="ignore"):
             products = [float(np.log(np.abs(sample.floquet.multipliers)).sum()) for sample in (a, b)]
         if max(map(abs, products)) < UNDAMPED:
@@ -165,7 +166,7 @@ class NeimarkSacker(BifurcationKind):
 
     def kappa(self, sample: Sample) -> float:
         """From the complex multiplier closest to the unit circle: `mu = exp(i kappa T)`."""
-        pairs = [mu for mu in sample.floquet.multipliers if mu.imag > 1e-9 * abs(mu)]
+        pairs = _pairs(sample)
         if not pairs:
             raise ConvergenceError("no complex pair of multipliers here")
         mu = min(pairs, key=lambda m: abs(abs(m) - 1.0))
@@ -181,22 +182,16 @@ class NeimarkSacker(BifurcationKind):
         return cmath.exp(2j * cmath.pi * solution.kappa / solution.state.rate)
 
 
-BRANCH_POINT, LIMIT_POINT, PERIOD_DOUBLING, NEIMARK_SACKER = (
-    BranchPoint(),
-    LimitPoint(),
-    PeriodDoubling(),
-    NeimarkSacker(),
-)
+BRANCH_POINT, LIMIT_POINT, PERIOD_DOUBLING = BranchPoint(), LimitPoint(), PeriodDoubling()
+NEIMARK_SACKER = NeimarkSacker()
 #: in the order in which they are looked for: a BP explains the LP test's change at a pitchfork
 ALL_KINDS: tuple[BifurcationKind, ...] = (BRANCH_POINT, LIMIT_POINT, PERIOD_DOUBLING, NEIMARK_SACKER)
 
 
 def solved_by(formulation: Formulation) -> dict[str, BifurcationKind]:
     """The kinds by name, to be solved for by a formulation; a branch point is always solved for in the same way."""
-    if formulation == BORDERED:
-        return {kind.name: kind for kind in ALL_KINDS}
-    kinds = (BRANCH_POINT, LimitPoint(formulation), PeriodDoubling(formulation), NeimarkSacker(formulation))
-    return {kind.name: kind for kind in kinds}
+    own = BRANCH_POINT, LimitPoint(formulation), PeriodDoubling(formulation), NeimarkSacker(formulation)
+    return {kind.name: kind for kind in (ALL_KINDS if formulation == BORDERED else own)}
 
 
 def changes(a: Sample, b: Sample) -> tuple[BifurcationKind, ...]:
@@ -220,6 +215,11 @@ def _zero(a: float, b: float) -> float:
     if a * b >= 0.0 or not np.isfinite(a * b):
         return 0.5
     return min(0.98, max(0.02, a / (a - b)))
+
+
+def _pairs(sample: Sample) -> list[complex]:
+    """The complex multipliers of the upper half plane."""
+    return [mu for mu in sample.floquet.multipliers if mu.imag > 1e-9 * abs(mu)]
 
 
 def _nearest(sample: Sample, target: float) -> float:
@@ -259,18 +259,10 @@ def locate(
     bisections: int = 34,
     begins: bool = False,
 ) -> Located | None:
-    """Locate a bifurcation of a kind whose test changed between two neighbours.
+    """Locate a bifurcation of a kind whose test changed between two neighbours; None if it turns out to be none.
 
-    Parameters
-    ----------
-    bisections
-        Halvings after which the bracket is taken for the answer.
-    begins
-        Whether the curve begins with the first neighbour: what lies right before it then belongs to no other step.
-
-    Returns
-    -------
-    None if the change of the test turns out to be no bifurcation of this kind.
+    After so many bisections the bracket is taken for the answer. `begins`: whether the curve begins with the first
+    neighbour; what lies right before it then belongs to no other step.
     """
     low, high = 0.0, 1.0
     at_low, at_high = a, b

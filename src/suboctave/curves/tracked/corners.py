@@ -13,12 +13,12 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from suboctave.bifurcation.gaps import GapExtrema, basis_rows, gap_extrema, level_rate, read_direction
+from suboctave.bifurcation.gaps import GapExtrema, gap_extrema
 from suboctave.continuation import CurvePoint, NewtonOptions
 from suboctave.continuation.linear import length
 from suboctave.continuation.newton import correct
 from suboctave.continuation.point import make_point
-from suboctave.continuation.problem import Array
+from suboctave.curves.events.grazings import height_gradient, nearest_extremum
 from suboctave.curves.sample import Sample
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.orbit import PeriodicOrbit
@@ -43,11 +43,11 @@ def beyond_corner(
     if grazing is None:
         return None
     gap, at, height = grazing
-    gradient, label = _gradient(last, gap, at), last.state.local(gap.element).element.label
-    coming = next((h for h in (_height(orbit, gap, at) for orbit in before) if abs(h) > _CLEAR * _size(last)), height)
-    point, curve = last.point, last.curve
-    where = curve.where(point.u)
-    row = gradient / point.weights
+    label, clear = last.state.local(gap.element).element.label, _CLEAR * float(np.abs(last.state.x).max())
+    coming = next((h for h in (_height(orbit, gap, at) for orbit in before) if abs(h) > clear), height)
+    point, curve, where = last.point, last.curve, last.where
+    by_x, rates = height_gradient(last.state, gap.element, gap.index, float(gap.tau[at]), curve.names)
+    row = curve.join(by_x, rates, np.zeros(curve.augmentation.extras)) / point.weights
     size = length(row)
     row = row / size
     for way in _HEIGHTS:
@@ -66,39 +66,14 @@ def beyond_corner(
     return None, f"{label} grazes at {where}: the equations are not smooth there"
 
 
-def _size(sample: Sample) -> float:
-    """The size of a motion that heights are compared with."""
-    return float(np.abs(sample.state.x).max())
-
-
 def _grazing(sample: Sample) -> tuple[GapExtrema, int, float] | None:
     """The extremum nearest to a grazing: its gap, its index there, its height over the gap; None if all are far."""
-    near = []
-    for gap in gap_extrema(sample.state):
-        heights = gap.value - gap.level
-        if len(heights):
-            at = int(np.abs(heights).argmin())
-            near.append((gap, at, float(heights[at])))
-    nearest = min(near, key=lambda item: abs(item[2]), default=None)
-    return nearest if nearest is not None and abs(nearest[2]) <= _GRAZES * _size(sample) else None
+    heights = [(gap, i, h) for gap in gap_extrema(sample.state) for i, h in enumerate((gap.value - gap.level).tolist())]
+    nearest = min(heights, key=lambda item: abs(item[2]), default=None)
+    return nearest if nearest and abs(nearest[2]) <= _GRAZES * float(np.abs(sample.state.x).max()) else None
 
 
 def _height(orbit: PeriodicOrbit, gap: GapExtrema, at: int) -> float:
     """Height of the same extremum on another motion; 0 where there is none."""
-    tau, maximum = float(gap.tau[at]), bool(gap.curve[at] < 0.0)
-    for other in gap_extrema(orbit.state()):
-        if (other.element, other.index) == (gap.element, gap.index):
-            same = np.flatnonzero((other.curve < 0.0) == maximum)
-            if same.size:
-                i = same[np.argmin(1.0 - np.cos(other.tau[same] - tau))]
-                return float(other.value[i] - other.level)
-    return 0.0
-
-
-def _gradient(sample: Sample, gap: GapExtrema, at: int) -> Array:
-    """Gradient of the extremum's height over the gap by u."""
-    state, curve = sample.state, sample.curve
-    value = basis_rows(state.basis.harmonics, float(gap.tau[at]))[0]
-    by_x = np.multiply.outer(value, read_direction(state, gap.element))
-    rates = np.array([-level_rate(state, gap.element, gap.index, name) for name in curve.names])
-    return curve.join(by_x, rates, np.zeros(curve.augmentation.extras))
+    same = nearest_extremum(orbit.state(), gap.element, gap.index, float(gap.tau[at]), bool(gap.curve[at] < 0.0))
+    return 0.0 if same is None else float(same[0].value[same[1]] - same[0].level)

@@ -60,12 +60,7 @@ def nearest_point(
     spare: float = 0.0,
 ) -> CurvePoint:
     """The point of a curve nearest to a guess close to it; `along`: its tangent, where that is about known; `spare` as
-    in `newton.correct`.
-
-    Raises
-    ------
-    ConvergenceError
-        If Newton's method does not converge.
+    in `newton.correct`. Raises ConvergenceError.
     """
     row = null_row(curve, u, weights) if along is None else weights * along / length(weights * along)
     try:
@@ -93,15 +88,11 @@ def zero_along(
     iterations: int = 12,
     factor: Factor | None = None,
 ) -> Sample:
-    """The zero of a function along a curve near one of its points, by secants in arclength.
+    """The zero of a function along a curve near one of its points, by secants in arclength; ConvergenceError where there
+    is none within `reach`.
 
     `slope`: about the derivative of the function by arclength at the zero, 0 if that is not known; `factor`: that of
     the start, if it was solved with about its tangent.
-
-    Raises
-    ------
-    ConvergenceError
-        If there is none within `reach`.
     """
     curve, weights = start.curve, start.weights
     row = weights * start.tangent
@@ -158,14 +149,10 @@ _JUMP = 0.5
 
 @dataclass(frozen=True)
 class LocatedEvent:
-    """An event between two neighbours.
+    """An event between two neighbours: its test, where it lies, and at an extremum which way the curve turns.
 
-    test, sample, extreme
-        Its test, where it lies, and at an extremum which way the curve turns.
-    rough, slope
-        Where more harmonics are to locate it better; about the test's derivative by arclength.
-    off
-        How far it may still lie off, in scaled arclength, where nothing could locate it better.
+    `rough`: where more harmonics are to locate it better; `slope`: about the test's derivative by arclength; `off`: how
+    far it may still lie off, in scaled arclength, where nothing could locate it better.
     """
 
     test: CurveTest
@@ -209,7 +196,7 @@ def located(test: CurveTest, low: Sample, high: Sample, newton: NewtonOptions) -
         # in this discretisation it lies before the first
         slope = (last - first) / way
         sample = zero_along(same.point, own.value, newton, way, slope)
-        return LocatedEvent(own, sample, extreme_of(own, -slope, sample), None, slope) if own.genuine(sample) else None
+        return LocatedEvent(own, sample, own.extreme(-slope, sample), None, slope) if own.genuine(sample) else None
     bracket = Bracket(same.point, high.point, (first, last), lambda point: own.value(Sample(point)), newton)
     share, little = bracket.zero(_ROUGH), _JUMP * min(abs(first), abs(last))
     # on a curve of extrema those that others bring about are known by their distance; multipliers tell only close by
@@ -230,7 +217,7 @@ def located(test: CurveTest, low: Sample, high: Sample, newton: NewtonOptions) -
     # what more harmonics will move need not be known better
     finer = _finer(sample) is not None
     sample = sample if finer else Sample(bracket.points[bracket.zero(_RESOLVED)])
-    return LocatedEvent(own, sample, extreme_of(own, first or -slope, sample), bracket if finer else None, slope)
+    return LocatedEvent(own, sample, own.extreme(first or -slope, sample), bracket if finer else None, slope)
 
 
 def _genuine(events: list[LocatedEvent], curve: MotionProblem, near: float) -> list[LocatedEvent]:
@@ -261,11 +248,6 @@ def _finer(sample: Sample) -> HarmonicBasis | None:
         return None
     basis = choose_harmonics(sample.state, curve.adaptive, curve.adaptive.event_tolerance)
     return basis if basis.harmonics > curve.balance.basis.harmonics else None
-
-
-def extreme_of(test: CurveTest, before: float, at: Sample) -> str:
-    """Whether a parameter that turns has a maximum or a minimum, empty for other events; before: the sign before it."""
-    return test.extreme(before, at) if isinstance(test, Extremum) else ""
 
 
 def refined(event: LocatedEvent, newton: NewtonOptions, warnings: list[str]) -> LocatedEvent:

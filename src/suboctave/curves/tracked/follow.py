@@ -20,7 +20,7 @@ from suboctave.curves.sample import Sample
 from suboctave.curves.trace import Settings, Trace, TrackedPoint
 from suboctave.curves.tracked.corners import beyond_corner
 from suboctave.curves.tracked.ends import End, comes_close, end_ahead, end_between, is_lopsided, points_before, rebased
-from suboctave.curves.tracked.events import LocatedEvent, StepWatch, as_event, events_between, extreme_of, refined
+from suboctave.curves.tracked.events import LocatedEvent, StepWatch, as_event, events_between, refined
 from suboctave.curves.tracked.start import Ranges
 from suboctave.curves.tracked.tests import Extremum, tests_of
 from suboctave.errors import ConvergenceError
@@ -124,7 +124,7 @@ class _Tracker(Driver):
                 continue
             i = last.curve.index(test.name)
             if last.point.tangent[i] * beyond.tangent[i] < 0.0:
-                turn = LocatedEvent(test, last, extreme_of(test, test.value(last), last))
+                turn = LocatedEvent(test, last, test.extreme(test.value(last), last))
                 event = as_event(turn, self.settings.stability, self.settings.observe)
                 width = abs(float(beyond.u[i] - last.point.u[i]))
                 events.append(replace(event, isola="", uncertainty=width, arclength=middle))

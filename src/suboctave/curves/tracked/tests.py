@@ -21,6 +21,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
@@ -81,6 +82,12 @@ class CurveTest(ABC):
         """Whether what was located is an event."""
         return True
 
+    def extreme(self, before: float, at: Sample) -> str:
+        """Whether a parameter that turns has a maximum or a minimum, empty for other events; before: the sign before
+        it.
+        """
+        return ""
+
     def confirmed(self, sample: Sample) -> bool:
         """Whether multipliers, which depend little on the harmonics kept, agree with an event as it is reported."""
         return True
@@ -103,7 +110,6 @@ class Extremum(CurveTest):
         return sample.curve.augmentation.name == "LP" and not sample.curve.augmentation.turning and sample.bend != 0.0
 
     def extreme(self, before: float, at: Sample) -> str:
-        """Whether the parameter has a maximum or a minimum at a zero; before: sign of the function before it."""
         rising = before * at.bend if self._beside_cusps(at) else before
         return "maximum" if rising > 0.0 else "minimum"
 
@@ -311,7 +317,7 @@ def _passing(first: ComplexArray, last: ComplexArray) -> tuple[complex, complex]
     staying = inside[(inside.imag > 0.0) & (np.abs(inside) <= 1.0)]
     if not (leaving.size and staying.size):
         return None
-    out, partner = min(((m, p) for m in leaving for p in staying), key=lambda pair: abs(pair[0] - pair[1]))
+    out, partner = min(product(leaving, staying), key=lambda pair: abs(pair[0] - pair[1]))
     return complex(out), complex(partner)
 
 
