@@ -145,8 +145,8 @@ class _Follower(Driver):
         self._kinds = solved_by(settings.formulation)
         #: looks for period doublings in place of det J_half, where the formulation has tests of its own
         self._watch: DoublingWatch | None = None
-        if settings.formulation.doubling_test is not None:
-            self._watch = DoublingWatch(settings.formulation.doubling_test, self._kinds["PD"], self._located)
+        if settings.formulation.test is not None:
+            self._watch = DoublingWatch(settings.formulation.test, self._kinds["PD"], self._located)
         #: somebody who keeps the curve so far (`progress.reporting`)
         self._keeper: Callable[[Trace], None] | None = None
         if settings.report is not None:
@@ -428,18 +428,17 @@ class _Follower(Driver):
             self.trace.warnings.append(f"event {event.name!r}: {failure}")
             return None
         sample = self._sample(point)
-        orbit, size = sample.orbit, sample.orbit.amplitude(self.settings.observe)
-        known = orbit.residual, size, sample.curve.name
-        return Bifurcation(event.name, orbit, sample.floquet, *known, arclength=point.arclength)
+        known = sample.orbit.residual, sample.orbit.amplitude(self.settings.observe), sample.curve.name
+        return Bifurcation(event.name, sample.orbit, sample.floquet, *known, arclength=point.arclength)
 
 
 def both_ways(point: CurvePoint, ahead: float, bounds: tuple[float, float], settings: Settings) -> Trace:
     """Follow a curve from an inner point to both sides; from a bound inwards only."""
     low, high = bounds
-    slack = 1e-9 * (high - low)
-    if abs(point.parameter - (low if ahead > 0 else high)) <= slack:
+    slack, (first, target) = 1e-9 * (high - low), (low, high) if ahead > 0 else (high, low)
+    if abs(point.parameter - first) <= slack:
         return follow(point, ahead, bounds, settings)
-    if abs(point.parameter - (high if ahead > 0 else low)) <= slack:
+    if abs(point.parameter - target) <= slack:
         back = follow(point, -ahead, bounds, settings)
         only = Trace(back.points[:1], endings=(Ending(EndReason.START), Ending(EndReason.START)))
         return back.reversed_before(only)
@@ -449,7 +448,7 @@ def both_ways(point: CurvePoint, ahead: float, bounds: tuple[float, float], sett
     back = follow(point, -ahead, bounds, settings)
     # between two folds the curve runs the other way: what matters is where it ends
     assert isinstance(point.curve, MotionProblem)
-    name, target = point.curve.name, high if ahead > 0 else low
+    name = point.curve.name
     ends = [t.points[-1].orbit for t in (forward, back)]
     misses = [abs((o.omega if name == "omega" else o.values[name]) - target) for o in ends]
     return back.reversed_before(forward) if misses[0] <= misses[1] else forward.reversed_before(back)

@@ -32,6 +32,8 @@ class Formulation(ABC):
     """One way to locate motions at which J_kappa is singular."""
 
     name: ClassVar[str]
+    #: the published test function that looks for period doublings, None for the sign of det J_half
+    test: str | None = None
 
     def operator(self, kind: Kind) -> type[SingularOperator]:
         """The equations that single them out."""
@@ -44,11 +46,6 @@ class Formulation(ABC):
     def locate(self, guess: Guess, kind: Kind) -> Singular:
         """Locate one from a guess; raises ConvergenceError."""
         return locate_singular(guess, kind, self.operator(kind))
-
-    @property
-    def doubling_test(self) -> str | None:
-        """The published test function that looks for period doublings, None for the sign of det J_half."""
-        return None
 
 
 @dataclass(frozen=True)
@@ -97,10 +94,6 @@ class Alcorta2019(Formulation):
 
     def locate(self, guess: Guess, kind: Kind) -> Singular:
         return locate_doubling(guess) if kind is Kind.HALF else super().locate(guess, kind)
-
-    @property
-    def doubling_test(self) -> str | None:
-        return self.test
 
 
 BORDERED = BorderedSystem()

@@ -53,11 +53,6 @@ class BranchPointUnfolded(Augmentation):
     ) -> tuple[BranchPointUnfolded, Array]:
         return cls.of(state, names[0]), np.zeros(1)
 
-    def renewed(self, state: BalanceState, borders: NullVectors) -> BranchPointUnfolded:
-        """The same at another motion, with its null vectors."""
-        units = self._units(state, self.parameter)
-        return replace(self, borders=borders, force=self._force(state), units=units)
-
     name = "BP"
     extras = 1
 
@@ -82,10 +77,7 @@ class BranchPointEquations(Equations):
         names: tuple[str, ...],
         border: Bordered | None = None,
     ) -> None:
-        self.of = of
-        self.state = state
-        self.names = names
-        self.beta = beta
+        self.of, self.state, self.beta, self.names = of, state, beta, names
         self._border = border
         self._unit = 1.0 / np.tile(state.balance.scales()[1], state.basis.size)
         self.column = of.force * of.borders.left * self._unit
@@ -124,4 +116,6 @@ class BranchPointEquations(Equations):
         return np.array([top / self.of.units[0], below / self.of.units[1]])
 
     def renewed(self) -> BranchPointUnfolded:
-        return self.of.renewed(self.state, self.bordered.vectors)
+        of, state = self.of, self.state
+        units = of._units(state, of.parameter)
+        return replace(of, borders=self.bordered.vectors, force=of._force(state), units=units)

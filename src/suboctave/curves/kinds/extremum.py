@@ -85,10 +85,7 @@ class ExtremalEquations(Equations):
     """The equations of the bifurcation and the one of the extremum."""
 
     def __init__(self, of: Extremal, state: BalanceState, extra: Array, names: tuple[str, ...]) -> None:
-        self.of = of
-        self.state = state
-        self.extra = extra
-        self.names = names
+        self.of, self.state, self.extra, self.names = of, state, extra, names
         self.base = of.base.at(state, extra, names)
         self.addition, self.column = self.base.addition, self.base.column
 

@@ -67,10 +67,7 @@ class GrazingEquations(Equations):
     """`u(tau) - gap` and `du/dtau`, in units of the motion."""
 
     def __init__(self, of: GrazingContactEquations, state: BalanceState, tau: float, names: tuple[str, ...]) -> None:
-        self.of = of
-        self.state = state
-        self.tau = tau
-        self.names = names
+        self.of, self.state, self.tau, self.names = of, state, tau, names
 
     @lazy
     def _rows(self) -> tuple[Array, Array, Array, Array]:

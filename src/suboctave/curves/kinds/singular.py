@@ -88,10 +88,7 @@ class SingularEquations(Equations):
     """g, or its real and imaginary part, in units of omega^2."""
 
     def __init__(self, of: SingularOperator, state: BalanceState, kappa: float, names: tuple[str, ...]) -> None:
-        self.of = of
-        self.state = state
-        self.kappa = kappa
-        self.names = names
+        self.of, self.state, self.kappa, self.names = of, state, kappa, names
         self._kept: Gradient | None = None
 
     @lazy

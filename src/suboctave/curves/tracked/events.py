@@ -88,8 +88,7 @@ def zero_along(
     iterations: int = 12,
     factor: Factor | None = None,
 ) -> Sample:
-    """The zero of a function along a curve near one of its points, by secants in arclength; ConvergenceError where there
-    is none within `reach`.
+    """The zero of a function along a curve near one of its points, by secants in arclength; raises ConvergenceError.
 
     `slope`: about the derivative of the function by arclength at the zero, 0 if that is not known; `factor`: that of
     the start, if it was solved with about its tangent.

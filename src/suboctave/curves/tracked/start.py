@@ -115,8 +115,14 @@ def solved_start(
     if is_extremum(item):
         curve = with_extremum(curve, u, item.parameter_name)
     anywhere = item.kind in MOTION_KINDS
+
+    def held(curve: MotionProblem, u: np.ndarray, weights: np.ndarray) -> np.ndarray | int:
+        # the last parameter keeps its value, unless the curve about stands still in it
+        row = null_row(curve, u, weights)
+        return curve.parameter if abs(row[-1]) > 1e-2 else row
+
     try:
-        start = settled(curve, u, settings.newton, held=_last_unless_it_turns)
+        start = settled(curve, u, settings.newton, held=held)
         moved = length(start.weights * (start.u - start.curve.transfer(u, curve)))
         if moved > (_BESIDE if anywhere else _NEAR):
             raise ConvergenceError(f"what was found lies elsewhere, at {start.curve.where(start.u)}")
@@ -128,9 +134,3 @@ def solved_start(
         else:
             words = f"the {item.kind} at {where} was not found again: {failure}"
         raise ConvergenceError(words) from None
-
-
-def _last_unless_it_turns(curve: MotionProblem, u: np.ndarray, weights: np.ndarray) -> np.ndarray | int:
-    """The last parameter keeps its value, unless the curve about stands still in it."""
-    row = null_row(curve, u, weights)
-    return curve.parameter if abs(row[-1]) > 1e-2 else row
