@@ -22,7 +22,7 @@ from collections.abc import Sequence
 from suboctave.bifurcation.gaps import GapExtrema
 from suboctave.continuation.problem import Array
 from suboctave.curves.crossings import first_doubtful
-from suboctave.curves.sample import Sample
+from suboctave.curves.sample import Excursions, Sample
 from suboctave.curves.trace import Unsettled
 from suboctave.harmonic.trigonometric import passages
 
@@ -36,9 +36,8 @@ MOST_PROBES = 60
 _REMEMBERED = 64
 #: intervals shorter than this are not cut because a contact grazes in them
 _LAYER = 1e-3
-#: excursions across a gap, in units of the largest relative displacement, that may end soon, and the share to which one
-#: may shrink in an interval
-_YOUNG, _SHRINKS = 0.05, 0.3
+#: share to which an excursion across a gap may shrink in an interval
+_SHRINKS = 0.3
 #: what an interval's contacts do: nothing, shrink towards its first or its last end, begin or cease within it
 _NOTHING, _FIRST, _LAST, _GRAZES = 0, 1, 2, 3
 #: where an interval is cut whose contacts shrink, as a fraction of it: closer to that end, towards which the intervals
@@ -91,27 +90,22 @@ class Steps:
 
 def _contacts_between(p: Sample, q: Sample) -> int:
     near = _NOTHING
-    for a, b in zip(p.gaps, q.gaps, strict=True):
+    for a, b, young_a, young_b in zip(p.gaps, q.gaps, p.young, q.young, strict=True):
         _, count, crossed, other = passages(a.tau, a.value, a.curve, a.level, b.tau, b.value, b.curve, b.level)
         if count > 0 or crossed != other:
             return _GRAZES
-        near = near or (_FIRST if _shrinks(a, b) else _LAST if _shrinks(b, a) else _NOTHING)
+        near = near or (_FIRST if _shrinks(young_a, b) else _LAST if _shrinks(young_b, a) else _NOTHING)
     return near
 
 
-def _shrinks(a: GapExtrema, b: GapExtrema) -> bool:
-    """Whether an excursion of one motion across a gap is a small part of the same excursion of another."""
-    # there are few extrema: numbers are quicker than arrays
-    values = a.value.tolist()
-    young = _YOUNG * max(map(abs, values), default=0.0)
-    for tau, value, curve in zip(a.tau.tolist(), values, a.curve.tolist(), strict=True):
-        height = a.level - value if curve > 0.0 else value - a.level
-        if 0.0 < height < young:
-            others = zip(b.tau.tolist(), b.value.tolist(), b.curve.tolist(), strict=True)
-            alike = [(math.cos(t - tau), v) for t, v, c in others if (c > 0.0) == (curve > 0.0)]
-            _, same = max(alike, key=lambda pair: pair[0], default=(0.0, b.level))
-            if height < _SHRINKS * (b.level - same if curve > 0.0 else same - b.level):
-                return True
+def _shrinks(young: Excursions, b: GapExtrema) -> bool:
+    """Whether one of a motion's excursions across a gap is a small part of the same excursion of another."""
+    for tau, height, curve in young:
+        others = zip(b.tau.tolist(), b.value.tolist(), b.curve.tolist(), strict=True)
+        alike = [(math.cos(t - tau), v) for t, v, c in others if (c > 0.0) == (curve > 0.0)]
+        _, same = max(alike, key=lambda pair: pair[0], default=(0.0, b.level))
+        if height < _SHRINKS * (b.level - same if curve > 0.0 else same - b.level):
+            return True
     return False
 
 

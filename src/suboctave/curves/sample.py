@@ -34,6 +34,10 @@ from suboctave.harmonic.perturbation import Kind
 from suboctave.lazy import lazy
 
 _MONODROMY = Monodromy()
+#: excursions across a gap: instant and height of an extremum, and its second derivative by tau
+Excursions = list[tuple[float, float, float]]
+#: height, in units of the largest relative displacement, up to which an excursion may end soon
+_YOUNG = 0.05
 #: coefficient of a double multiplier, in units of omega, below which rounding has its say (an undamped structure)
 _NOTHING = 1e-9
 
@@ -117,6 +121,19 @@ class Sample:
     def gaps(self) -> tuple[GapExtrema, ...]:
         """The elements' gaps with the extrema of the motion there."""
         return gap_extrema(self.state)
+
+    @lazy
+    def young(self) -> list[Excursions]:
+        """Of every gap the excursions across it that may end soon."""
+        found = []
+        # there are few extrema: numbers are quicker than arrays
+        for gap in self.gaps:
+            values, level = gap.value.tolist(), gap.level
+            most = _YOUNG * max(map(abs, values), default=0.0)
+            turns = zip(gap.tau.tolist(), values, gap.curve.tolist(), strict=True)
+            heights = [(tau, level - value if curve > 0.0 else value - level, curve) for tau, value, curve in turns]
+            found.append([item for item in heights if 0.0 < item[1] < most])
+        return found
 
     @lazy
     def slope(self) -> float:
