@@ -180,10 +180,8 @@ class _Follower(Driver):
             self.trace.end_at(self._turned)
 
     def _sample(self, point: CurvePoint) -> Sample:
-        candidate = self._candidate
-        if candidate is not None and candidate.point is point:
-            return candidate
-        return Sample(point, self.settings.stability)
+        known = self._candidate
+        return known if known is not None and known.point is point else Sample(point, self.settings.stability)
 
     def _clear(self, a: CurvePoint, b: CurvePoint) -> bool:
         """True if a step stays on its curve and its interior could be looked at, or ends where it meets another."""
@@ -359,12 +357,13 @@ class _Follower(Driver):
         if complaint is not None:
             self._guard.doubt(*complaint)
         if events:
-            met = self.trace.bifurcations[-4:]
-            fresh = [pair for pair in events if not any(same_event(pair[1], other) for other in met)]
-            for _, item in events:
+            fresh, met = [], self.trace.bifurcations[-4:]
+            for place, item in events:
                 again = next((other for other in met if same_event(item, other)), None)
+                if again is None:
+                    fresh.append((place, item))
                 # of a hidden pair that more harmonics have shown one may lie ahead again
-                if again is not None and item.kind not in CONTACT_KINDS and again not in self._shown:
+                elif item.kind not in CONTACT_KINDS and again not in self._shown:
                     self._guard.doubt(a, b, f"a second {item.kind} may lie beside that which is listed")
             self.trace.bifurcations += behind_their_grazings(fresh)
         if self._watch is not None and not resting:
@@ -374,10 +373,8 @@ class _Follower(Driver):
                     self._guard.doubt(p, q, _NOT_FOUND["PD"])
                 else:
                     self._insert(item)
-        for event in self.settings.events:
-            crossed = self._event(event, a, b)
-            if crossed is not None:
-                self.trace.events.append(crossed)
+        crossed = (self._event(event, a, b) for event in self.settings.events)
+        self.trace.events += [item for item in crossed if item is not None]
 
     def _changes(self, a: Sample, b: Sample) -> list[BifurcationKind]:
         """The kinds to look for between two samples, as they are to be solved for."""
@@ -395,15 +392,13 @@ class _Follower(Driver):
     def _located(self, kind: BifurcationKind, a: Sample, b: Sample) -> Located | None:
         """A bifurcation between two neighbours; a branch point only if its system was solved."""
         known = self._last_located
-        if known is not None and known[0] is kind and known[1] is a and known[2] is b:
-            return known[3]
-        must_solve = kind is BRANCH_POINT
-        begins = a.point.arclength == 0.0 and len(self.trace.points) <= 1
-        located = locate(kind, a, b, self.settings.newton, 9 if must_solve else 34, begins)
-        if must_solve and located is not None and located.solution is None:
-            located = None
-        self._last_located = (kind, a, b, located)
-        return located
+        if known is None or known[0] is not kind or known[1] is not a or known[2] is not b:
+            must_solve = kind is BRANCH_POINT
+            begins = a.point.arclength == 0.0 and len(self.trace.points) <= 1
+            located = locate(kind, a, b, self.settings.newton, 9 if must_solve else 34, begins)
+            unsolved = must_solve and located is not None and located.solution is None
+            self._last_located = known = (kind, a, b, None if unsolved else located)
+        return known[3]
 
     def _event_value(self, event: Event, sample: Sample) -> float:
         try:

@@ -61,8 +61,8 @@ def relation(one: PeriodicOrbit, other: PeriodicOrbit) -> Relation:
     Mirrored: an image under a change of signs of DOFs and a shift by half periods of the load (see the module).
     Permutations of identical masses are not among them: such images are others.
     """
-    nu, a, b = _together(one, other)
-    room = (TOLERANCE * _size(a, b)) ** 2
+    nu, a, b, size = _together(one, other)
+    room = (TOLERANCE * size) ** 2
     images = a * _turns(len(a), nu)
     plus, minus = (np.sum(np.abs(images - sign * b) ** 2, axis=1) for sign in (1.0, -1.0))
     off = plus.sum(axis=1)[::2]
@@ -75,9 +75,9 @@ def relation(one: PeriodicOrbit, other: PeriodicOrbit) -> Relation:
 
 def apart(one: PeriodicOrbit, other: PeriodicOrbit) -> float:
     """Distance of two motions relative to the larger one, shifted against each other such that it is least."""
-    nu, a, b = _together(one, other)
+    nu, a, b, size = _together(one, other)
     off = np.linalg.norm((a * _turns(len(a), nu)[::2] - b).reshape(nu, -1), axis=1)
-    return float(off.min()) / (_size(a, b) or 1.0)
+    return float(off.min()) / (size or 1.0)
 
 
 def image_of(orbit: PeriodicOrbit) -> PeriodicOrbit:
@@ -201,15 +201,12 @@ def _written(orbit: PeriodicOrbit, nu: int, top: int) -> ComplexArray:
     return c
 
 
-def _together(one: PeriodicOrbit, other: PeriodicOrbit) -> tuple[int, ComplexArray, ComplexArray]:
-    """Two motions in one basis, with the harmonics that both were solved with: nu, amplitudes."""
+def _together(one: PeriodicOrbit, other: PeriodicOrbit) -> tuple[int, ComplexArray, ComplexArray, float]:
+    """Two motions in one basis, with the harmonics that both were solved with: nu, amplitudes, size of the larger."""
     nu = math.lcm(one.basis.nu, other.basis.nu)
     top = min(o.basis.harmonics * nu // o.basis.nu for o in (one, other))
-    return nu, _written(one, nu, top), _written(other, nu, top)
-
-
-def _size(*amplitudes: ComplexArray) -> float:
-    return max(float(np.linalg.norm(c)) for c in amplitudes)
+    a, b = _written(one, nu, top), _written(other, nu, top)
+    return nu, a, b, max(float(np.linalg.norm(a)), float(np.linalg.norm(b)))
 
 
 def _turns(count: int, nu: int) -> ComplexArray:

@@ -268,16 +268,12 @@ class Sample:
         if critical is None:
             return mu
         distance = np.minimum(np.abs(mu - critical), np.abs(mu - np.conj(critical)))
-        nearest = np.argsort(distance, kind="stable")
-        result: ComplexArray
-        if self.curve.augmentation.name != "NS" and mu[nearest[0]].imag != 0.0:
-            # two that are nearly the same came out as a pair, whose sum is known better than either
-            pair = np.abs(mu - np.conj(mu[nearest[0]])).argmin()
-            beside = 2.0 * mu[nearest[0]].real - critical
-            result = np.append(np.delete(mu, [nearest[0], pair]), beside)
-        else:
-            result = np.delete(mu, nearest[: 2 if self.curve.augmentation.name == "NS" else 1])
-        return result
+        nearest, several = np.argsort(distance, kind="stable"), self.curve.augmentation.name == "NS"
+        if several or mu[nearest[0]].imag == 0.0:
+            return np.delete(mu, nearest[: 2 if several else 1])
+        # two that are nearly the same came out as a pair, whose sum is known better than either
+        pair = np.abs(mu - np.conj(mu[nearest[0]])).argmin()
+        return np.append(np.delete(mu, [nearest[0], pair]), 2.0 * mu[nearest[0]].real - critical)
 
 
 @lru_cache(maxsize=64)

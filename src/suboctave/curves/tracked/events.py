@@ -171,15 +171,12 @@ def events_between(
     is not lost, nor found twice, if that of the others moves it across.
     """
     events: list[LocatedEvent] = []
-    for test in tests:
-        own: list[LocatedEvent] = []
-        for a, b in itertools.pairwise(samples):
-            try:
-                item = located(test, a, b, newton) if test.changed(a, b) else None
-                own += [] if item is None else [item]
-            except ConvergenceError as failure:
-                warnings.append(f"{test.kind} near {b.where}: {failure}")
-        events += own
+    for test, (a, b) in itertools.product(tests, itertools.pairwise(samples)):
+        try:
+            item = located(test, a, b, newton) if test.changed(a, b) else None
+            events += [] if item is None else [item]
+        except ConvergenceError as failure:
+            warnings.append(f"{test.kind} near {b.where}: {failure}")
     near = SAME * (samples[-1].place - samples[0].place)
     return sorted(_genuine(events, samples[-1].curve, near), key=lambda item: item.sample.place)
 
@@ -324,14 +321,12 @@ def _contact(sample: Sample) -> GrazingContact | None:
 def _isola(event: LocatedEvent) -> str:
     """What happens to branches at an extremum along a curve of limit points."""
     curve, sample = event.sample.curve, event.sample
-    if not isinstance(event.test, Extremum) or curve.augmentation.name != "LP" or curve.augmentation.turning:
+    base = curve.augmentation
+    if not isinstance(event.test, Extremum) or not isinstance(base, SingularOperator) or base.name != "LP":
         return ""
     (beside,) = set(curve.names) - {event.test.name}
-    base = curve.augmentation
-    assert isinstance(base, SingularOperator)
     extremal = LimitPointExtremal(base, beside, 1.0, event.test.name)
-    equations = extremal.at(sample.state, sample.evaluation.extra, curve.names)
-    return equations.isola
+    return extremal.at(sample.state, sample.evaluation.extra, curve.names).isola
 
 
 class StepWatch(Steps):
