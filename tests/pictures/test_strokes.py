@@ -5,7 +5,7 @@ import pytest
 
 from suboctave.errors import InputError
 from suboctave.pictures.strokes import bent, cut, line, without_repeats
-from suboctave.store.layout import EventRow, curve_dataset
+from suboctave.store.layout import UNKNOWN, EventRow, curve_dataset
 
 X = np.arange(5.0)
 
@@ -52,7 +52,7 @@ def test_two_events_in_one_step():
         return [EventRow("PD", 1, 1.2, 1.4, stable_after=told), EventRow("PD", 1, 1.7, 2.9)]
 
     between = [([0.0, 1.0, 1.2], True), ([1.2, 1.7], False), ([1.7, 2.0, 3.0, 4.0], True)]
-    assert described(curve([1] * 5, rows(None))) == between  # not told: a picture promises nothing
+    assert described(curve([1] * 5, rows(UNKNOWN))) == between  # not told: a picture promises nothing
     assert described(curve([1] * 5, rows(False))) == between
     assert described(curve([0] * 5, rows(True))) == [
         ([0.0, 1.0, 1.2], False),

@@ -55,14 +55,14 @@ class Relation(Enum):
         return self in (Relation.SAME, Relation.SHIFTED)
 
 
-def relation(one: PeriodicOrbit, other: PeriodicOrbit) -> Relation:
+def relation(one: PeriodicOrbit, other: PeriodicOrbit, tolerance: float = TOLERANCE) -> Relation:
     """What a motion is to another of the same system at the same frequency and parameters.
 
     Mirrored: an image under a change of signs of DOFs and a shift by half periods of the load (see the module).
     Permutations of identical masses are not among them: such images are others.
     """
     nu, a, b, size = _together(one, other)
-    room = (TOLERANCE * size) ** 2
+    room = (tolerance * size) ** 2
     images = a * _turns(len(a), nu)
     plus, minus = (np.sum(np.abs(images - sign * b) ** 2, axis=1) for sign in (1.0, -1.0))
     off = plus.sum(axis=1)[::2]

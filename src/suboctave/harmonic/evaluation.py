@@ -31,6 +31,7 @@ from suboctave.harmonic.assembly import (
 from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis, spectrum_to_real
 from suboctave.harmonic.equations import Equations, Laws
 from suboctave.harmonic.linear_part import LinearPart
+from suboctave.harmonic.quadrature import Nodes
 from suboctave.lazy import lazy
 
 __all__ = ["BalanceState", "HarmonicBalance", "length"]
@@ -130,6 +131,11 @@ class BalanceState:
         """Complex coefficients of the displacement along each group's direction, (G, H + 1)."""
         return self._displacements(self.balance.directions, len(self.balance.groups))
 
+    @lazy
+    def nodes(self) -> list[Nodes]:
+        """Nodes along the motion of the groups' laws in closed form that are smooth."""
+        return self.packed.nodes(self.motions, self.balance.top)
+
     def _displacements(self, directions: Sparse, count: int) -> ComplexArray:
         out = np.zeros((count, self.basis.harmonics + 1), dtype=complex)
         add_displacements(self.x, directions, out)
@@ -144,7 +150,7 @@ class BalanceState:
             for g, group in enumerate(balance.groups)
         ]
         return [
-            (along, laws_along(along, members, self.packed, g))
+            (along, laws_along(along, members, (self.packed, self.nodes), g))
             for g, (along, members) in enumerate(zip(alongs, self.laws.groups, strict=True))
         ]
 
@@ -181,7 +187,7 @@ class BalanceState:
         """
         balance, packed, motions = self.balance, self.packed, self.motions
         table = np.zeros((3, len(balance.all_groups), balance.top + 1), dtype=complex)
-        packed.add_spectra(motions, table)
+        packed.add_spectra(motions, self.nodes, table)
         if not packed.whole:
             for g, (along, laws) in enumerate(self._along):
                 for law in laws:

@@ -19,6 +19,7 @@ from suboctave.harmonic.aft.general import GeneralLaw
 from suboctave.harmonic.aft.law import Along, LawAlong, Member, Second, Third
 from suboctave.harmonic.aft.table import PackedLaws
 from suboctave.harmonic.basis import Array, ComplexArray
+from suboctave.harmonic.quadrature import Nodes
 from suboctave.lazy import lazy
 
 __all__ = ["Channel", "Group", "laws_along"]
@@ -45,11 +46,11 @@ class Group:
 
 
 def laws_along(
-    along: Along, members: Sequence[Member], packed: PackedLaws | None = None, direction: int = 0
+    along: Along, members: Sequence[Member], known: tuple[PackedLaws, list[Nodes]] | None = None, direction: int = 0
 ) -> list[LawAlong]:
-    """The laws of elements along a motion, those that are integrated alike together; `packed` as in `ClosedForm`."""
+    """The laws of elements along a motion, those that are integrated alike together; `known` as in `ClosedForm`."""
     closed = [member for member in members if member.kind.whole]
-    laws: list[LawAlong] = [ClosedForm(along, closed, packed, direction)] if closed else []
+    laws: list[LawAlong] = [ClosedForm(along, closed, known, direction)] if closed else []
     alike: dict[tuple[type, bool], list[Member]] = {}
     for member in members:
         if not member.kind.whole:

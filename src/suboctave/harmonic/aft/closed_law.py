@@ -17,34 +17,42 @@ from suboctave.harmonic.aft.general import GeneralLaw
 from suboctave.harmonic.aft.law import Along, CoefficientSpectra, LawAlong, Member, Second, Third
 from suboctave.harmonic.aft.table import PackedLaws, Weights
 from suboctave.harmonic.basis import Array, ComplexArray
-from suboctave.harmonic.quadrature import search_grid
+from suboctave.harmonic.quadrature import Nodes, search_grid
 from suboctave.lazy import lazy
-from suboctave.model.elements.smoothness import PiecewiseLinear
+from suboctave.model.elements.smoothness import PiecewiseLinear, SharpSampling
 
 __all__ = ["ClosedForm"]
 
 
 class ClosedForm(LawAlong):
-    """All laws along one direction whose smoothness class is all of them; `packed` has them as arrays, with others, in
-    the row `direction`.
+    """All laws along one direction whose smoothness class is all of them; `known` has them as arrays, with others, in
+    the row `direction`, and the nodes of all.
     """
 
     whole = True
 
     def __init__(
-        self, along: Along, members: Sequence[Member], packed: PackedLaws | None = None, direction: int = 0
+        self,
+        along: Along,
+        members: Sequence[Member],
+        known: tuple[PackedLaws, list[Nodes]] | None = None,
+        direction: int = 0,
     ) -> None:
         super().__init__(along, members)
-        self._packed = PackedLaws([members]) if packed is None else packed
+        if known is None:
+            packed = PackedLaws([members])
+            known = packed, packed.nodes(along.motions, along.top)
+        self._packed, self._nodes = known
         self._direction = direction
 
     def add_spectra(self, out: ComplexArray) -> None:
         """See `LawAlong.add_spectra`."""
-        PackedLaws([self.members]).add_spectra(self.along.motions, out[:, None])
+        own = ClosedForm(self.along, self.members)
+        own._packed.add_spectra(self.along.motions, own._nodes, out[:, None])
 
     @lazy
     def _weights(self) -> list[Weights]:
-        return self._packed.weights(self._direction, self.along.motion, self.along.top)
+        return self._packed.weights(self._direction, self.along.motion, self._nodes)
 
     def second(self) -> list[Second]:
         """See `LawAlong.second`."""
@@ -66,7 +74,7 @@ class ClosedForm(LawAlong):
         """See `LawAlong.by_coefficients`."""
         kind, c = member.kind, member.coefficients
         if not isinstance(kind, PiecewiseLinear):
-            return GeneralLaw(self.along, [member]).by_coefficients(member)
+            return self._asked(member).by_coefficients(member)
         count, top = len(c), self.along.top
         force = np.zeros((count, top + 1), dtype=complex)
         tangent = np.zeros((count, 1, top + 1), dtype=complex)
@@ -96,9 +104,16 @@ class ClosedForm(LawAlong):
                     rows.append((c[piece.stiffness], c[piece.gap], float(piece.side)))
                     changes.append((by[piece.stiffness], by[piece.gap]))
             else:
-                GeneralLaw(self.along, [member]).add_change(rates, out)
+                self._asked(member).add_change(rates, out)
         if rows:
             out[:2] += self._changed(np.array(rows), np.array(changes))
+
+    def _asked(self, member: Member) -> GeneralLaw:
+        """A smooth law to be asked at nodes."""
+        sharp = isinstance(member.kind, SharpSampling)
+        return GeneralLaw(
+            self.along, [member], self._packed.sharp_nodes(self._direction, self._nodes) if sharp else None
+        )
 
     def _changed(self, pieces: Array, rates: Array) -> ComplexArray:
         """What rates of stiffness and gap (P, 2) of pieces (P, 3) do to force and slope, (2, top + 1)."""

@@ -98,8 +98,9 @@ class GeneralLaw(LawAlong):
     displacements, time or a velocity in which they are sharp, come alone.
     """
 
-    def __init__(self, along: Along, members: Sequence[Member]) -> None:
+    def __init__(self, along: Along, members: Sequence[Member], nodes: Nodes | None = None) -> None:
         super().__init__(along, members)
+        self._given = nodes
         _, self.element, self.kind, self.c, _ = members[0]
         self.count = len(along.motions)
         self.moving = self.element.depends_on_velocity
@@ -135,7 +136,9 @@ class GeneralLaw(LawAlong):
 
     @lazy
     def nodes(self) -> Nodes:
-        """Instants and weights chosen for the law."""
+        """Instants and weights chosen for the law, if none were given."""
+        if self._given is not None:
+            return self._given
         kind, along = self.kind, self.along
         varying = self.harmonic * along.nu
         if isinstance(kind, PolynomialSampling):

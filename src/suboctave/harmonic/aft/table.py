@@ -128,31 +128,36 @@ class PackedLaws:
             if len(rows := self.steps[low:high])
         ]
 
-    def add_spectra(self, motions: ComplexArray, table: ComplexArray) -> None:
+    def nodes(self, motions: ComplexArray, top: int) -> list[Nodes]:
+        """Nodes for every smooth law along motions (G, H + 1), good for Fourier coefficients up to `top`."""
+        return [_nodes(motions[g], polynomial, sharp, top) for g, polynomial, _, sharp in self._smooth]
+
+    def add_spectra(self, motions: ComplexArray, nodes: list[Nodes], table: ComplexArray) -> None:
         """Add the Fourier coefficients of the laws known in closed form along motions (G, H + 1), and of their slopes,
         to `table` (>= 2, >= G, top + 1).
         """
         if len(self.pieces):
             grid = search_grid(motions.shape[1] - 1)
             add_pieces(motions, self.pieces, self.first, grid.zr, grid.zi, table)
-        for g, polynomial, steps, sharp in self._smooth:
-            nodes = _nodes(motions[g], polynomial, sharp, table.shape[2] - 1)
-            add_smooth(motions[g], polynomial, steps, nodes.zr, nodes.zi, nodes.weights, table, g)
+        for (g, polynomial, steps, _), at in zip(self._smooth, nodes, strict=True):
+            add_smooth(motions[g], polynomial, steps, at.zr, at.zi, at.weights, table, g)
 
-    def weights(self, direction: int, motion: ComplexArray, top: int) -> list[Weights]:
-        """Second and third derivatives along the motion (H + 1,) in a direction, good for Fourier coefficients up to
-        `top`.
-        """
+    def weights(self, direction: int, motion: ComplexArray, nodes: list[Nodes]) -> list[Weights]:
+        """Second and third derivatives along the motion (H + 1,) in a direction."""
         parts, pieces = [], self.pieces[self.first[direction] : self.first[direction + 1]]
         if len(pieces):
             grid = search_grid(len(motion) - 1)
             parts.append(Weights(*corner_weights(motion, pieces, grid.zr, grid.zi)))
-        for g, polynomial, steps, sharp in self._smooth:
+        for (g, polynomial, steps, _), at in zip(self._smooth, nodes, strict=True):
             if g == direction and (len(polynomial) > 2 or len(steps)):
-                nodes = _nodes(motion, polynomial, sharp, top)
-                both = smooth_weights(motion, polynomial, steps, nodes.zr, nodes.zi, nodes.weights)
-                parts.append(Weights(nodes.zr, nodes.zi, *both))
+                both = smooth_weights(motion, polynomial, steps, at.zr, at.zi, at.weights)
+                parts.append(Weights(at.zr, at.zi, *both))
         return parts
+
+    def sharp_nodes(self, direction: int, nodes: list[Nodes]) -> Nodes | None:
+        """Those of the arctan steps in a direction, None without any."""
+        steps = (at for (g, _, steps, _), at in zip(self._smooth, nodes, strict=True) if g == direction and len(steps))
+        return next(steps, None)
 
 
 def _nodes(motion: ComplexArray, polynomial: Array, sharp: tuple[Array, Array] | None, top: int) -> Nodes:

@@ -233,19 +233,22 @@ class DeclaredElement(Element):
     """An element without velocity whose smoothness class is all of its law (`whole`): that evaluates it."""
 
     @abstractmethod
-    def sampling(self, c: Array) -> WholeLaw:
+    def law_at(self, c: Array) -> WholeLaw:
         """The law at these coefficients."""
 
+    def sampling(self, c: Array) -> Sampling:
+        return self.law_at(c)
+
     def tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, None]:
-        return *self.sampling(c).tangent(u, c), None
+        return *self.law_at(c).tangent(u, c), None
 
     def curvature(self, u: Array, v: Array, c: Array) -> tuple[Array, None, None]:
         """`f_uu`; at corners its regular part."""
-        return self.sampling(c).curvature(u, c), None, None
+        return self.law_at(c).curvature(u, c), None, None
 
     def third(self, u: Array, v: Array, c: Array) -> tuple[Array, None, None, None]:
         """`f_uuu`; at corners its regular part."""
-        return self.sampling(c).third(u, c), None, None, None
+        return self.law_at(c).third(u, c), None, None, None
 
 
 def required(owner: str, **given: Any) -> None:

@@ -39,7 +39,7 @@ class PolynomialSpring(DeclaredElement):
             self.coefficient_names = tuple(f"c{power}" for power in powers)
         super().__init__(dof, factors, direction=direction)
 
-    def sampling(self, c: Array) -> PolynomialSampling:
+    def law_at(self, c: Array) -> PolynomialSampling:
         """A polynomial in u alone."""
         factors = [0.0] * (max(self.powers) + 1)
         for power, factor in zip(self.powers, c, strict=True):

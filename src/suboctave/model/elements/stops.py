@@ -113,7 +113,7 @@ class _Stops(DeclaredElement):
                 "1e100): leave it out for the exact law, or choose units in which the gap is nearer to 1"
             )
 
-    def sampling(self, c: Array) -> PiecewiseLinear | SharpSampling:
+    def law_at(self, c: Array) -> PiecewiseLinear | SharpSampling:
         """Piecewise linear, or sharp at the gaps with width 1/s."""
         if self.regularised:
             return _arctan_steps(self.sides, tuple(c.tolist()))
