@@ -4,6 +4,7 @@ and results that can be saved, loaded and written as a table.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -234,7 +235,7 @@ def _entries(made: Any) -> Iterator[tuple[str, Any, On]]:
             yield name, kind, places[0] if places else On()
 
 
-class TimeResult(Stored):
+class TimeResult(Stored, ABC):
     """A result of time integration: trajectories, sections, diagrams, exponents, basins, tests, verifications.
 
     `contents` says in files what it is, and `picture` which function of `pictures.in_time` draws it. Fields that say
@@ -257,8 +258,9 @@ class TimeResult(Stored):
 
         return pd.DataFrame(self._columns())
 
+    @abstractmethod
     def _columns(self) -> Mapping[str, Any]:
-        raise NotImplementedError
+        """The columns of `to_dataframe`, by name."""
 
     def _derived(self) -> Mapping[str, Any]:
         """Variables `(axes, values)` and attributes of the dataset that are no fields."""

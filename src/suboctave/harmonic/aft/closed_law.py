@@ -74,7 +74,7 @@ class ClosedForm(LawAlong):
         """See `LawAlong.by_coefficients`."""
         kind, c = member.kind, member.coefficients
         if not isinstance(kind, PiecewiseLinear):
-            return self._asked(member).by_coefficients(member)
+            return self._at_nodes(member).by_coefficients(member)
         count, top = len(c), self.along.top
         force = np.zeros((count, top + 1), dtype=complex)
         tangent = np.zeros((count, 1, top + 1), dtype=complex)
@@ -104,12 +104,12 @@ class ClosedForm(LawAlong):
                     rows.append((c[piece.stiffness], c[piece.gap], float(piece.side)))
                     changes.append((by[piece.stiffness], by[piece.gap]))
             else:
-                self._asked(member).add_change(rates, out)
+                self._at_nodes(member).add_change(rates, out)
         if rows:
             out[:2] += self._changed(np.array(rows), np.array(changes))
 
-    def _asked(self, member: Member) -> GeneralLaw:
-        """A smooth law to be asked at nodes."""
+    def _at_nodes(self, member: Member) -> GeneralLaw:
+        """A smooth law, evaluated at nodes."""
         sharp = isinstance(member.kind, SharpSampling)
         return GeneralLaw(
             self.along, [member], self._packed.sharp_nodes(self._direction, self._nodes) if sharp else None
