@@ -4,7 +4,6 @@ and results that can be saved, loaded and written as a table.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -235,7 +234,7 @@ def _entries(made: Any) -> Iterator[tuple[str, Any, On]]:
             yield name, kind, places[0] if places else On()
 
 
-class TimeResult(Stored, ABC):
+class TimeResult(Stored):
     """A result of time integration: trajectories, sections, diagrams, exponents, basins, tests, verifications.
 
     `contents` says in files what it is, and `picture` which function of `pictures.in_time` draws it. Fields that say
@@ -258,9 +257,8 @@ class TimeResult(Stored, ABC):
 
         return pd.DataFrame(self._columns())
 
-    @abstractmethod
     def _columns(self) -> Mapping[str, Any]:
-        """The columns of `to_dataframe`, by name."""
+        raise NotImplementedError
 
     def _derived(self) -> Mapping[str, Any]:
         """Variables `(axes, values)` and attributes of the dataset that are no fields."""
