@@ -70,7 +70,7 @@ def test_both_formulations_from_beside_the_extremum(sharpness):
     extremum = reference_extremum(sharpness)
     orbit = extremum.orbit
     values = {**orbit.values, "j": orbit.values["j"] - 1e-3}
-    beside = replace(orbit, omega=orbit.omega + 1e-3, values=values, coefficients=1.001 * orbit.coefficients)
+    beside = replace(orbit, omega=orbit.omega + 1e-3, values=values, x=1.001 * orbit.x)
     for formulation in ("bordered", "alcorta2019"):
         found = so.locate_extremum(replace(extremum, orbit=beside), formulation=formulation)
         assert found.omega == pytest.approx(extremum.omega, abs=1e-9)

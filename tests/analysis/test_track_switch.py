@@ -60,7 +60,7 @@ def test_a_period_doubling_in_the_doubled_basis_is_no_limit_point_to_follow(bord
     basis = orbit.basis.doubled
     x = orbit.basis.resized(orbit.coefficients, basis)
     balance = orbit.balance.with_basis(basis).settle(x, orbit.omega, orbit.values)
-    written = replace(orbit, balance=balance, coefficients=x)
+    written = replace(orbit, balance=balance, x=x)
     singular = np.linalg.svd(written.state().jacobian, compute_uv=False)
     assert singular[-1] < 1e-6 * singular[0]
     taken = so.Bifurcation("LP", written, highest.floquet, highest.residual, highest.amplitude, "omega")

@@ -138,7 +138,7 @@ def test_newton_starts_right_behind_the_grazing(Kc, zeta, share, rounding):
     orbit = curve.grazings[0].orbit
     for size in 10.0 ** -np.arange(4, 10):
         for sign in (1.0, -1.0):
-            start = guess_at(replace(orbit, coefficients=orbit.coefficients * (1.0 - sign * size)))
+            start = guess_at(replace(orbit, x=orbit.x * (1.0 - sign * size)))
             if sign > 0.0:
                 with pytest.raises(ConvergenceError):
                     LimitPoint().solve(start)

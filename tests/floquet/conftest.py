@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import importlib.util
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -195,7 +193,7 @@ def at():
         for _ in range(20):
             state = balance.at(x, omega, orbit.values)
             x -= np.linalg.solve(state.jacobian, state.residual).reshape(x.shape)
-        return replace(orbit, coefficients=x, omega=omega)
+        return replace(orbit, x=x, omega=omega)
 
     return solved
 
@@ -203,13 +201,3 @@ def at():
 @pytest.fixture(scope="session")
 def drag():
     return Drag
-
-
-@pytest.fixture(scope="session")
-def condensed():
-    """The condensed linear part of the tests of `harmonic`."""
-    path = Path(__file__).parents[1] / "harmonic" / "conftest.py"
-    spec = importlib.util.spec_from_file_location("_harmonic_conftest", path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module.Condensed

@@ -1,6 +1,6 @@
 """A model condensed onto the one DOF that stop and load touch: nothing above may notice.
 
-Six masses in a row; the condensed linear part is in flexibility form, by direct inversion of the dynamic stiffness.
+Six masses in a row, condensed by themselves, against all of them unknown.
 Curve, multipliers and located bifurcations must be those of the full model: the equations are the same, only the
 unknowns that could be eliminated are gone.
 """
@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import suboctave as so
-from suboctave.errors import ConvergenceError, InputError
+from suboctave.errors import InputError
 from suboctave.floquet.monodromy import floquet_multipliers
-from suboctave.harmonic import HarmonicBalance, HarmonicBasis
+from suboctave.harmonic import HarmonicBalance, HarmonicBasis, StructuralMatrices
 
 N = 6
 
@@ -29,15 +29,19 @@ def chain(dof, unit=1.0):
     )
 
 
+def whole(system, *arguments, **options):
+    """The response with all degrees of freedom unknown."""
+    return so.frequency_response(system, *arguments, linear=StructuralMatrices(system), **options)
+
+
 @pytest.fixture(scope="module")
 def full():
+    return whole(chain(0), (0.35, 1.0), harmonics=9)
+
+
+@pytest.fixture(scope="module")
+def condensed_branch():
     return so.frequency_response(chain(0), (0.35, 1.0), harmonics=9)
-
-
-@pytest.fixture(scope="module", params=[1.0, 2.0], ids=["S = 1", "S = 2"])
-def condensed_branch(request, condensed):
-    system = chain(0)
-    return so.frequency_response(system, (0.35, 1.0), harmonics=9, linear=condensed(system, [0], request.param))
 
 
 def test_same_bifurcations(full, condensed_branch):
@@ -89,18 +93,10 @@ def test_same_curve(full, condensed_branch):
     for i in range(0, len(condensed_branch), 5):
         point = condensed_branch.points[i]
         orbit = point.orbit
-        assert orbit.coefficients.shape == (19, 1)
-        # the other masses follow from the forces at the first
-        state = orbit.state()
-        start = np.zeros((19, N))
-        start[:, :1] = orbit.coefficients
-        force = state.unbalanced
-        c = -(force[1::2] - 1j * force[2::2])[:, 0]
-        z = balance.linear.stiffness(np.arange(10) * orbit.omega)
-        x = np.linalg.solve(z[1:], np.eye(N)[None, :, :1] * c[:, None, None])[:, :, 0]
-        start[0] = np.linalg.solve(z[0].real, -force[0, 0] * np.eye(N)[0])
-        start[1::2], start[2::2] = x.real, -x.imag
-        assert start[:, 0] == pytest.approx(orbit.coefficients[:, 0], abs=1e-9)
+        assert orbit.x.shape == (19, 1)
+        start = orbit.coefficients
+        assert start.shape == (19, N)
+        assert start[:, 0] == pytest.approx(orbit.x[:, 0], abs=1e-14)
         whole = balance.at(start, orbit.omega)
         assert np.abs(whole.residual).max() < 1e-9
         verdict = floquet_multipliers(whole)
@@ -114,46 +110,51 @@ def test_same_curve(full, condensed_branch):
     assert condensed_branch.ended == full.ended
 
 
-def test_units_do_not_matter(condensed):
-    """Masses, stiffnesses and loads a million times larger, S chosen likewise: the same points, to rounding."""
+def test_units_do_not_matter():
+    """Masses, stiffnesses and loads a million times larger: the same points, to rounding."""
     curves = []
     for unit in (1.0, 1e6):
         system = chain(0, unit)
-        curves.append(so.frequency_response(system, (0.5, 0.7), harmonics=5, linear=condensed(system, [0], unit)))
+        curves.append(so.frequency_response(system, (0.5, 0.7), harmonics=5))
     assert len(curves[0]) == len(curves[1])
     np.testing.assert_allclose(curves[1].amplitude, curves[0].amplitude, rtol=1e-6)
     assert [b.kind for b in curves[0].bifurcations] == [b.kind for b in curves[1].bifurcations]
 
 
-def test_the_observed_dof_is_one_of_the_structure(condensed):
-    """A stop at the last mass: `observe`, `amplitude` and `harmonic` count the structure's DOFs."""
+def test_any_dof_is_observed():
+    """A stop at the last mass: `observe`, `amplitude`, `harmonic` and `displacement` count the structure's DOFs."""
     system = chain(N - 1)
-    branch = so.frequency_response(system, (0.3, 0.4), harmonics=5, linear=condensed(system, [N - 1]))
-    whole = so.frequency_response(system, (0.3, 0.4), harmonics=5)
-    assert branch.amplitude[-1] == pytest.approx(whole.amplitude[-1], rel=1e-8)
-    with pytest.raises(InputError, match="not among"):
-        branch.orbits[-1].amplitude(0)
-    assert branch.orbits[-1].harmonic(1, N - 1) == pytest.approx(whole.orbits[-1].harmonic(1, N - 1), rel=1e-7)
+    branch, other = (verb(system, (0.3, 0.4), harmonics=5) for verb in (so.frequency_response, whole))
+    one, all_ = branch.orbits[-1], other.orbits[-1]
+    for dof in range(N):
+        assert one.amplitude(dof) == pytest.approx(all_.amplitude(dof), rel=1e-8)
+        assert one.harmonic(1, dof) == pytest.approx(all_.harmonic(1, dof), rel=1e-7)
+    np.testing.assert_allclose(one.displacement(0.7), all_.displacement(0.7), atol=1e-9)
+    observed = so.frequency_response(system, (0.3, 0.4), harmonics=5, observe=2)
+    assert observed.amplitude[-1] == pytest.approx(all_.amplitude(2), rel=1e-8)
 
 
-def test_time_integration_is_refused(condensed):
-    """A state of the condensed unknowns is no state of the structure."""
+def test_starts_are_given_for_the_structure():
+    """A state, coefficients or a motion of all degrees of freedom; and the motion read back is the same."""
     system = chain(0)
-    with pytest.raises(ConvergenceError, match="full system"):
-        so.frequency_response(system, (0.3, 0.4), harmonics=5, linear=condensed(system, [0]), start=[0.1, 0.0])
+    motion = whole(system, (0.35, 0.4), harmonics=5).orbits[0]
+    for start in (motion, motion.coefficients, motion.start()):
+        again = so.frequency_response(system, (0.35, 0.36), harmonics=5, start=start).orbits[0]
+        np.testing.assert_allclose(again.coefficients, motion.coefficients, atol=1e-9)
+    with pytest.raises(InputError, match="length 12"):
+        so.frequency_response(system, (0.3, 0.4), harmonics=5, start=[0.1, 0.0])
 
 
 @pytest.mark.parametrize("formulation", ["extended", "alcorta2019"])
-def test_period_doublings_by_other_formulations(condensed, formulation):
+def test_period_doublings_by_other_formulations(formulation):
     """Extended systems see the linear part through its contract alone, as the bordered one does."""
     k = 2.0 * np.eye(3) - np.eye(3, k=1) - np.eye(3, k=-1)
     elements = [so.ElasticStop(0, 9.0, 0.0), so.CubicSpring(0, 0.1)]
     system = so.System(np.eye(3), 0.03 * k, 2.0 * k, elements, [so.HarmonicLoad(0, 0.5)])
-    linear = condensed(system, [0], 2.0)
-    whole = so.frequency_response(system, (2.8, 2.2), 9, formulation=formulation).bifurcations["PD"]
-    small = so.frequency_response(system, (2.8, 2.2), 9, linear=linear, formulation=formulation).bifurcations["PD"]
-    default = so.frequency_response(system, (2.8, 2.2), 9, linear=linear).bifurcations["PD"]
+    full = whole(system, (2.8, 2.2), 9, formulation=formulation).bifurcations["PD"]
+    small = so.frequency_response(system, (2.8, 2.2), 9, formulation=formulation).bifurcations["PD"]
+    default = so.frequency_response(system, (2.8, 2.2), 9).bifurcations["PD"]
     assert len(default) == 2
-    assert [b.omega for b in small] == pytest.approx([b.omega for b in whole], abs=1e-9)
+    assert [b.omega for b in small] == pytest.approx([b.omega for b in full], abs=1e-9)
     exact = formulation == "extended"
     assert [b.omega for b in small] == pytest.approx([b.omega for b in default], abs=1e-10 if exact else 1e-4)

@@ -45,7 +45,7 @@ def shifted(orbit, halves, signs):
     rows = np.zeros_like(orbit.coefficients)
     top = orbit.basis.harmonics
     rows[0], rows[1::2], rows[2::2] = c[0].real, c[1 : top + 1].real, -c[1 : top + 1].imag
-    return replace(orbit, coefficients=rows)
+    return replace(orbit, x=rows)
 
 
 def rewritten(orbit, harmonics, nu):
@@ -92,7 +92,7 @@ def test_signs_of_single_masses_mirror_and_their_permutation_does_not():
         loads=[so.HarmonicLoad(dof=0, amplitude=1.0)],
     )
     orbit = so.frequency_response(system, (0.9, 0.8)).orbits[0]
-    other = replace(orbit, coefficients=orbit.coefficients[:, ::-1].copy())
+    other = replace(orbit, x=orbit.x[:, ::-1].copy())
     assert np.allclose(np.sort(np.abs(orbit.amplitudes), axis=1), np.sort(np.abs(other.amplitudes), axis=1))
     assert relation(orbit, other) is Relation.OTHER
     assert relation(orbit, shifted(orbit, 0, [1.0, -1.0])) is Relation.MIRRORED

@@ -26,7 +26,7 @@ def test_right_motions_agree(rattling_curve, duffing_curve):
 @pytest.mark.parametrize("size", [0.01, 0.1, 1.0])
 def test_a_planted_error_is_seen(duffing_curve, size):
     orbit = duffing_curve.orbits[len(duffing_curve) // 2]
-    wrong = replace(orbit, coefficients=orbit.coefficients * (1.0 + size))
+    wrong = replace(orbit, x=orbit.x * (1.0 + size))
     check = so.verify(wrong)
     assert not check.agrees
     assert check.distance > 1e-3
@@ -37,7 +37,7 @@ def test_a_missing_harmonic_is_seen(duffing_curve):
     orbit = duffing_curve.orbits[int(duffing_curve.amplitude.argmax())]
     coefficients = orbit.coefficients.copy()
     coefficients[5:] = 0.0
-    assert not so.verify(replace(orbit, coefficients=coefficients)).agrees
+    assert not so.verify(replace(orbit, x=coefficients)).agrees
 
 
 def test_too_few_harmonics_are_seen():

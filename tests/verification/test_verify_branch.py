@@ -56,7 +56,7 @@ def test_a_wrong_motion_is_found(duffing_curve):
     orbit = duffing_curve.orbits[30]
     coefficients = orbit.coefficients.copy()
     coefficients[1] *= 1.02
-    wrong = planted(duffing_curve, 30, orbit=replace(orbit, coefficients=coefficients))
+    wrong = planted(duffing_curve, 30, orbit=replace(orbit, x=coefficients))
     check = so.verify(wrong, points=range(25, 36), bifurcations=False)
     assert [point.index for point in check.disagreements] == [30]
     assert not check.agrees

@@ -307,7 +307,7 @@ def _doubled(item: Bifurcation, curve: MotionProblem, sign: float, run: CurveRun
     if curve.adaptive is not None:
         curve = curve.with_basis(parent.basis.doubled)
     vectors = item.null_vectors or null_vectors(parent.state(), Kind.HALF)
-    u = curve.join(parent.basis.resized(parent.coefficients, curve.balance.basis), item.parameter(item.parameter_name))
+    u = curve.join(parent.basis.resized(parent.x, curve.balance.basis), item.parameter(item.parameter_name))
     doubling = Singular(parent.state(), vectors, 0.0, item.residual, 0)
     direction = emanating(doubling, curve, curve.weights(u, 0.0))
     _scale_from_rest(curve, u, direction)
@@ -395,7 +395,7 @@ def _distance(point: CurvePoint, u: Array, curve: MotionProblem) -> float:
 def _at(item: Bifurcation, curve: MotionProblem) -> tuple[MotionProblem, Array]:
     """The curve in the harmonics of a bifurcation, and that point on it."""
     curve = curve.with_basis(item.orbit.basis)
-    return curve, curve.join(item.orbit.coefficients, item.parameter(item.parameter_name))
+    return curve, curve.join(item.orbit.x, item.parameter(item.parameter_name))
 
 
 def _oriented(direction: Array, weights: Array) -> Array:

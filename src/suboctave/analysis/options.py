@@ -214,7 +214,7 @@ class CurveRun:
     def curve(self, omega: float, nu: int, linear: LinearPart | None) -> MotionProblem:
         """The motions of `nu` load periods; `omega` where that is not free."""
         low, high = self.bounds
-        return make_curve(self.system, self.name, omega, high - low, self.harmonics, nu, linear)
+        return make_curve(self.system, self.name, omega, high - low, self.harmonics, nu, linear, self.settings.observe)
 
     def scaled(self, curve: MotionProblem) -> MotionProblem:
         """The curve in units of the larger one of the linear responses at both ends."""

@@ -298,9 +298,9 @@ def _modes(balance: HarmonicBalance) -> list[Array]:
     """Undamped linear modes in the unknowns, unit length in the masses' weights, the slowest first."""
     from scipy.linalg import eigh
 
-    mass, _, stiffness = balance.system.matrices()
+    mass, _, stiffness = balance.linear.equation_of_motion()
     _, vectors = eigh(0.5 * (stiffness + stiffness.T), 0.5 * (mass + mass.T))
-    shapes = [balance.linear.retain(v) for v in vectors.T]
+    shapes = list((np.array([balance.linear.expand(unit) for unit in np.eye(balance.size)]) @ vectors).T)
     weight = balance.scales()[0]
     return [s / length(weight * s) for s in shapes if length(weight * s) > 0.0]
 
@@ -320,7 +320,7 @@ def _resonant(curve: MotionProblem, frequency: float, shape: Array) -> list[Arra
         x = np.zeros((single.basis.size, single.size))
         x[1] = cosines
         state = single.at(x, frequency)
-        rest = state.residual.reshape(x.shape) + (load if state.compliance is None else 0.0)
+        rest = state.residual.reshape(x.shape) + load
         own = slice(single.size, 2 * single.size)
         return rest[1], state.jacobian[own, own]
 

@@ -484,4 +484,4 @@ def _beside_doubling(item: TrackedEvent, names: tuple[str, ...], ranges: Ranges,
 def _moved(orbit: PeriodicOrbit, state: BalanceState) -> PeriodicOrbit:
     """Another motion in the place of one."""
     values = dict(state.values)
-    return replace(orbit, balance=state.balance, coefficients=state.x.copy(), omega=state.omega, values=values)
+    return replace(orbit, balance=state.balance, x=state.x.copy(), omega=state.omega, values=values)

@@ -194,12 +194,6 @@ def _growth_size(state: BalanceState, kind: Kind, psi: np.ndarray, phi: np.ndarr
     left, right = Waves.of(state, kind, psi), Waves.of(state, kind, phi)
     frequency = right.at.values * state.rate
     slope = np.einsum("fij,fj->fi", state.linear.stiffness(frequency, 1), right.amplitudes)
-    compliance, change = state.linear.compliance(frequency), state.linear.compliance(frequency, 1)
-    if compliance is not None and change is not None:
-        # at a null vector the elements answer with the forces that balance A phi
-        force = np.einsum("fij,fj->fi", state.linear.stiffness(frequency), right.amplitudes)
-        force = np.linalg.solve(compliance, force[..., None])[..., 0]
-        slope = slope - np.einsum("fij,fj->fi", change, force)
     return float(np.abs(left.amplitudes.conj() * slope).sum())
 
 

@@ -32,15 +32,24 @@ SAFETY = 2.0
 _GRID = np.array([0.02, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.98])
 
 
-def first_doubtful(places: Sequence[float], tests: Sequence[Array], at: int) -> tuple[int, float] | None:
+def first_doubtful(
+    places: Sequence[float], tests: Sequence[Array], at: int, others: Sequence[Array] = ()
+) -> tuple[int, float] | None:
     """The first of several functions of which a zero may hide between `places[at]` and `places[at + 1]`, and where, as
     a fraction of the interval, not too close to its ends, so that both parts shrink; None if none is in doubt.
 
     Three to six different places ascend, up to two on either side of the interval; `tests` has at every place the
-    functions' signs and logarithms of moduli, (2, m). The side of an exact zero is the caller's business.
+    functions' signs and logarithms of moduli, (2, m). The side of an exact zero is the caller's business. `others`:
+    functions with the same zeros, NaN where there is none; what one of two tells without doubt is so.
     """
-    k, share = _first_doubtful(np.array(places), np.array(tests), at)
-    return None if share < 0.0 else (k, min(0.6, max(0.4, share)))
+    x, values, k = np.array(places), np.array(tests), -1
+    while True:
+        k, share = _first_doubtful(x, values, at, k + 1)
+        if share < 0.0:
+            return None
+        other = np.array([one[:, k : k + 1] for one in others])
+        if not others or np.isnan(other).any() or _first_doubtful(x, other, at, 0)[1] >= 0.0:
+            return k, min(0.6, max(0.4, share))
 
 
 @kernel()
@@ -83,13 +92,13 @@ def _interpolated(places, tests, at, k, values):
 
 
 @kernel()
-def _first_doubtful(places, tests, at):
-    """`first_doubtful` of tests (N, 2, m): which function, and the share, which is -1 where none is in doubt."""
+def _first_doubtful(places, tests, at, first):
+    """`first_doubtful` of tests (N, 2, m) from the function `first` on: which one, and the share, -1 without doubt."""
     p, q = places[at], places[at + 1]
     h, low, high = q - p, max(0, at - 2), min(places.shape[0], at + 4)
     values, grid = np.empty(places.shape[0]), _GRID.shape[0]
     shares, value, doubt = np.empty(grid + 2), np.empty(grid + 2), np.empty(grid + 2)
-    for function in range(tests.shape[2]):
+    for function in range(first, tests.shape[2]):
         chord, bent, third, shift, before, behind = _interpolated(places, tests, at, function, values)
         # one that is nothing all along says nothing
         if np.isnan(values[0]):

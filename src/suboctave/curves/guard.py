@@ -214,6 +214,9 @@ class GuardedStep(Interior):
         self.refused = self.refused or (known is None and self.size > _JUMP)
         return known
 
+    def relative(self, sample: Sample) -> Array:
+        return sample.relative if self.turned is None else super().relative(sample)
+
     def measures(self, sample: Sample) -> Array:
         """The tests at a sample, without their zeros at a branch point at which the curve turns back."""
         crossing = self.turned

@@ -29,7 +29,7 @@ import numpy as np
 
 from suboctave.continuation.problem import Array
 from suboctave.curves.trace import BranchPoint
-from suboctave.harmonic.basis import ComplexArray
+from suboctave.harmonic.basis import ComplexArray, to_complex, to_real
 from suboctave.harmonic.orbit import PeriodicOrbit
 
 #: two motions are one if they differ by less, relative to their size: solved twice they differ by the harmonics
@@ -83,10 +83,8 @@ def apart(one: PeriodicOrbit, other: PeriodicOrbit) -> float:
 def image_of(orbit: PeriodicOrbit) -> PeriodicOrbit:
     """-x(t + T / 2), whether it solves the equations or not."""
     k = np.arange(orbit.basis.harmonics + 1)[:, None]
-    c = -orbit.amplitudes * np.exp(1j * np.pi * k / orbit.basis.nu)
-    x = np.empty_like(orbit.coefficients)
-    x[0], x[1::2], x[2::2] = c[0].real, c[1:].real, -c[1:].imag
-    return replace(orbit, coefficients=x)
+    c = -to_complex(orbit.x) * np.exp(1j * np.pi * k / orbit.basis.nu)
+    return replace(orbit, x=to_real(c))
 
 
 def mirrored(orbit: PeriodicOrbit) -> PeriodicOrbit | None:
@@ -195,8 +193,8 @@ def _written(orbit: PeriodicOrbit, nu: int, top: int) -> ComplexArray:
     """Complex amplitudes at k omega / nu, k = 0 .. top, DOFs in units of the square roots of their masses."""
     stride = nu // orbit.basis.nu
     kept = top // stride + 1
-    c = np.zeros((top + 1, orbit.amplitudes.shape[1]), dtype=complex)
-    c[: stride * (kept - 1) + 1 : stride] = orbit.amplitudes[:kept]
+    c = np.zeros((top + 1, orbit.x.shape[1]), dtype=complex)
+    c[: stride * (kept - 1) + 1 : stride] = to_complex(orbit.x)[:kept]
     c *= orbit.balance.scales()[0]
     return c
 

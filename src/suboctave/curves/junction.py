@@ -64,7 +64,7 @@ def parts_of(curve: MotionProblem, u: Array) -> list[Array]:
 def repeats_earlier(orbit: PeriodicOrbit) -> bool:
     """Whether a motion repeats after a part of the period that it is written with."""
     basis, scales = orbit.basis, orbit.balance.scales()[0]
-    x = orbit.coefficients.reshape(basis.size, -1) * scales
+    x = orbit.x.reshape(basis.size, -1) * scales
     least = min((float(np.linalg.norm(x[rows])) for rows in _rows_of_parts(basis.nu, basis.harmonics)), default=np.inf)
     return least <= NOTHING_LEFT * float(np.linalg.norm(x))
 

@@ -32,6 +32,7 @@ from suboctave.curves.motion import MotionEvaluation, MotionProblem
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.assembly import apply_blocks, block_diagonal
 from suboctave.harmonic.basis import HarmonicBasis, spectrum_to_real
+from suboctave.harmonic.condensed import linear_part_of
 from suboctave.harmonic.evaluation import BalanceState, HarmonicBalance
 from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
 from suboctave.harmonic.orbit import PeriodicOrbit
@@ -40,6 +41,8 @@ from suboctave.lazy import lazy
 from suboctave.model.system import System
 from suboctave.timedomain import integrate
 
+#: harmonics that are expected of a rule that chooses them
+_EXPECTED = 15
 #: unknowns of a dense problem beyond which a run is refused (a matrix of half a gigabyte)
 _DENSE_UNKNOWNS = 8000
 
@@ -47,7 +50,14 @@ Harmonics = int | str | AdaptiveHarmonics
 
 
 def make_curve(
-    system: System, name: str, omega: float, span: float, harmonics: Harmonics, nu: int, linear: LinearPart | None
+    system: System,
+    name: str,
+    omega: float,
+    span: float,
+    harmonics: Harmonics,
+    nu: int,
+    linear: LinearPart | None,
+    observe: int = 0,
 ) -> MotionProblem:
     """The curve of a system's motions of `nu` load periods along a free parameter; InputError where it cannot be."""
     loaded = max([1] + [c.harmonic for c in system.load_components()])
@@ -56,9 +66,13 @@ def make_curve(
     high = rule if isinstance(rule, int) else max(rule.minimum, loaded)
     if linear is not None and not isinstance(linear, LinearPart):
         raise InputError(f"linear must fulfil suboctave.harmonic.LinearPart, {type(linear).__name__} does not")
-    size = system.n if linear is None else linear.size
+    if linear is None:
+        kept = high if adaptive is None else max(high, _EXPECTED)
+        linear = linear_part_of(
+            system, None, (kept + 0.5) * (omega + (span if name == "omega" else 0.0)), None, [observe]
+        )
     basis = HarmonicBasis(high * nu, nu)
-    check_unknowns(size, basis)
+    check_unknowns(linear.size, basis)
     return MotionProblem.response(HarmonicBalance(system, basis, linear=linear), name, omega, span, adaptive)
 
 
@@ -110,19 +124,13 @@ _UNBOUNDED = 1e4
 def linear_response(curve: MotionProblem, value: float) -> Array:
     """u of the response without elements, at a value of the free parameter."""
     state = curve.balance.at(*curve.split(curve.join(np.zeros(curve.balance.dimension), value)))
-    load = _load(state)
+    load = curve.balance.load(state.values, state.omega)
     try:
         inverse = np.linalg.inv(state.blocks).astype(complex)
     except np.linalg.LinAlgError:
         # a free body or an undamped resonance: the least motion that balances what can be balanced
         inverse = np.linalg.pinv(state.blocks).astype(complex)
     return curve.join(apply_blocks(inverse, load), value)
-
-
-def _load(state: BalanceState) -> Array:
-    """P, through the compliance of a condensed structure."""
-    load = state.balance.load(state.values, state.omega)
-    return load if state.compliance is None else apply_blocks(state.compliance, load)
 
 
 def start_point(curve: MotionProblem, value: float, given: Any, newton: NewtonOptions) -> CurvePoint:
@@ -243,11 +251,11 @@ def settled(
 
 def _from_given(curve: MotionProblem, value: float, given: Any) -> Array:
     balance = curve.balance
-    basis, size = balance.basis, balance.size
+    basis, n = balance.basis, balance.system.n
     if isinstance(given, PeriodicOrbit):
-        if given.coefficients.shape[1] != size:
-            raise InputError(f"start has {given.coefficients.shape[1]} DOFs, the system has {size}")
-        return curve.join(given.basis.resized(given.coefficients, basis), value)
+        if given.system.n != n:
+            raise InputError(f"start has {given.system.n} DOFs, the system has {n}")
+        return curve.join(given.basis.resized(balance.linear.read(given.coefficients), basis), value)
     try:
         array = np.asarray(given, dtype=float)
     except (TypeError, ValueError, OverflowError):
@@ -257,29 +265,29 @@ def _from_given(curve: MotionProblem, value: float, given: Any) -> Array:
         ) from None
     if not np.isfinite(array).all():
         raise InputError("start contains numbers that are not finite")
-    if array.ndim == 1 and array.size == 2 * size:
+    if array.ndim == 1 and array.size == 2 * n:
         return _integrated(curve, value, array)
     shape = np.shape(given)
-    if array.ndim == 1 and size == 1:  # coefficients of one degree of freedom
+    if array.ndim == 1 and n == 1:  # coefficients of one degree of freedom
         array = array[:, None]
-    if array.ndim == 2 and array.shape[1] == size and array.shape[0] % 2 == 1 and array.shape[0] > 1:
-        return curve.join(HarmonicBasis(array.shape[0] // 2, basis.nu).resized(array, basis), value)
+    if array.ndim == 2 and array.shape[1] == n and array.shape[0] % 2 == 1 and array.shape[0] > 1:
+        return curve.join(
+            HarmonicBasis(array.shape[0] // 2, basis.nu).resized(balance.linear.read(array), basis), value
+        )
     raise InputError(
-        f"start must be a PeriodicOrbit, a state (x, dx/dt) of length {2 * size}, or coefficients of shape "
-        f"(2 H + 1, {size}), H at least 1; got an array of shape {shape}"
+        f"start must be a PeriodicOrbit, a state (x, dx/dt) of length {2 * n}, or coefficients of shape "
+        f"(2 H + 1, {n}), H at least 1; got an array of shape {shape}"
     )
 
 
 def _integrated(curve: MotionProblem, value: float, state: Array) -> Array:
     """Harmonics of the motion over one period from a state."""
     balance = curve.balance
-    if balance.size != balance.system.n:
-        raise ConvergenceError("time integration needs the full system, not a condensed one")
     _, omega, values = curve.split(curve.join(np.zeros(balance.dimension), value))
     samples = 8 * balance.basis.harmonics + 8
     times = np.linspace(0.0, 2.0 * math.pi * balance.basis.nu / omega, samples + 1)
     trajectory = integrate(balance.system, state, times, omega, values, rtol=1e-6)
-    spectrum = np.fft.rfft(trajectory.x[:-1], axis=0) / samples
+    spectrum = np.fft.rfft(balance.linear.read(trajectory.x[:-1]), axis=0) / samples
     return curve.join(spectrum_to_real(spectrum, balance.basis.harmonics), value)
 
 
@@ -293,7 +301,7 @@ class _HeldEvaluation(MotionEvaluation):
 
     @lazy
     def _rate(self) -> Array:
-        return self.state.residual + _load(self.state).ravel() - self.hold @ self.state.unknowns
+        return self.state.residual + self.state.load.ravel() - self.hold @ self.state.unknowns
 
     @lazy
     def residual(self) -> Array:
@@ -334,9 +342,6 @@ class _Held(MotionProblem):
     def hold(self) -> Array:
         """B."""
         balance, rest = self.balance, self.rest
-        if rest.compliance is not None:
-            # a condensed structure is known by its compliance alone
-            return rest.linear_jacobian
         multiples = np.arange(balance.basis.harmonics + 1) / balance.basis.nu
         blocks = np.zeros((len(multiples), balance.size, balance.size), dtype=complex)
         blocks[:] = np.diag(rest.omega**2 * balance.scales()[0] ** 2)
@@ -345,10 +350,7 @@ class _Held(MotionProblem):
     def first(self) -> Array:
         """The held motion without a share of its own: linear."""
         load = -self.evaluate(self.join(self.rest.x, 0.0)).residual
-        try:
-            return np.append(np.linalg.solve(self.hold, load), 0.0)
-        except np.linalg.LinAlgError:
-            raise ConvergenceError("the condensed structure is free to move, or undamped at its resonance") from None
+        return np.append(np.linalg.solve(self.hold, load), 0.0)
 
     def motion(self, u: Array) -> Array:
         """u as one of the response curve."""

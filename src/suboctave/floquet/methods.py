@@ -157,7 +157,7 @@ class Arbitration(StabilityMethod):
             try:
                 other = witness.multipliers(state)
             except ConvergenceError as failure:  # with more harmonics the motion may leave the range of the forces
-                other = FloquetResult.inapplicable(2 * state.balance.system.n, witness.name, str(failure))
+                other = FloquetResult.inapplicable(len(result.multipliers), witness.name, str(failure))
             results.append(other)
             if not other.applicable:
                 continue

@@ -464,7 +464,7 @@ def floquet_multipliers(state: BalanceState) -> FloquetResult:
 
 def _no_numbers(state: BalanceState, count: int) -> FloquetResult:
     """Where a law gives no number between the samples of a motion; OverflowError for sizes beyond numbers."""
-    mass, _, stiffness = state.balance.system.with_parameters(state.values).matrices()
+    mass, _, stiffness = state.linear.equation_of_motion()
     with np.errstate(all="ignore"):
         turns = math.sqrt(float(np.abs(np.linalg.solve(mass, stiffness)).max())) / state.omega
     if not turns < _MOST_TURNS:

@@ -12,10 +12,13 @@ sqrt(1 + |mu|^2), that keeps large multipliers from drowning the rest.
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from suboctave.compiled import kernel
 from suboctave.harmonic.basis import Array, ComplexArray
+from suboctave.harmonic.linear_part import LinearPart
 
 #: sum of the logarithms of all multipliers, `-int trace(M^-1 (C + f_v)) dt`, below which a motion counts as undamped
 UNDAMPED = 1e-9
@@ -31,6 +34,22 @@ def symmetric_functions(mu: ComplexArray) -> Array:
     out = np.empty((2, 3))
     _multiply(mu, out)
     return out
+
+
+@lru_cache(maxsize=64)
+def _exponents(linear: LinearPart) -> ComplexArray:
+    mass, damping, stiffness = linear.equation_of_motion()
+    n = len(mass)
+    inverse = np.linalg.inv(mass)
+    flow = np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ stiffness, -inverse @ damping]])
+    exponents: ComplexArray = np.linalg.eigvals(flow).astype(complex)
+    return exponents
+
+
+def linear_multipliers(linear: LinearPart, period: float) -> ComplexArray:
+    """Multipliers of a structure without its elements over a period, (2 N,)."""
+    multipliers: ComplexArray = np.exp(_exponents(linear) * period)
+    return multipliers
 
 
 @kernel()

@@ -143,6 +143,13 @@ def to_complex(coefficients: NDArray[Any]) -> ComplexArray:
     return result
 
 
+def to_real(amplitudes: ComplexArray) -> Array:
+    """Complex amplitudes (H + 1, ...) to real coefficients (2 H + 1, ...), as `to_complex` reads them."""
+    result = np.empty((2 * amplitudes.shape[0] - 1,) + amplitudes.shape[1:])
+    result[0], result[1::2], result[2::2] = amplitudes[0].real, amplitudes[1:].real, -amplitudes[1:].imag
+    return result
+
+
 def spectrum_to_real(spectrum: ComplexArray, harmonics: int) -> Array:
     """Fourier coefficients `g_q = mean(g exp(-i q tau))` to real ones `(a_0, a_1, b_1, ...)` up to `harmonics`; first
     axis.

@@ -5,7 +5,7 @@
 second order `v_ab = omega_a D u_b + omega_b D u_a`; hence, with q_a = (u_a, v_a) the change of what a law reads,
 
     F''[a, b] = < sum_rs f_rs q_a,r q_b,s + sum_i f_vi (v_ab)_i >  + terms with the element's coefficients,
-    R''[a, b] = A''[a, b] X + A'[a] X_b + A'[b] X_a + B''[a, b] S + B'[a] S'[b] + B'[b] S'[a] + B S''[a, b].
+    R''[a, b] = A''[a, b] X + A'[a] X_b + A'[b] X_a + S''[a, b].
 
 *Along perturbations of any shift* (`waves`), omega and the parameters kept: `R'' = B(f w0) F''` and `R''' = B(f w0)
 F'''`, the Fourier coefficients of `f_qq[a, b]` and `f_qqq[a, b, c]` along the motion, at the sums of the frequencies
@@ -65,17 +65,6 @@ def change_at(channel: Channel, a: Direction, zr: Array, zi: Array) -> Array:
     return np.concatenate((values[:, 0], rates))
 
 
-def _unbalanced_along(state: BalanceState, a: Direction) -> Array:
-    """S'[a], shape (2 H + 1, size)."""
-    result = (state.force_jacobian @ a.x.ravel()).reshape(a.x.shape)
-    for name, rate in a.rates.items():
-        if rate != 0.0:
-            change = state.unbalanced_by(name)
-            if change is not None:
-                result = result + rate * change
-    return result
-
-
 def _unbalanced_second(state: BalanceState, a: Direction, b: Direction) -> Array:
     """S''[a, b], shape (2 H + 1, size)."""
     result = np.zeros_like(state.x)
@@ -130,32 +119,24 @@ def _by_coefficients(state: BalanceState, channel: Channel, a: Direction, b: Dir
     return result
 
 
-def _linear_change(state: BalanceState, a: Direction, compliance: bool) -> ComplexArray | None:
-    """A'[a] or B'[a] per harmonic, None if zero."""
+def _linear_change(state: BalanceState, a: Direction) -> ComplexArray | None:
+    """A'[a] per harmonic, None if zero."""
     linear, freq = state.linear, state.frequencies
-    by = linear.compliance_by if compliance else linear.stiffness_by
-    plain = linear.compliance if compliance else linear.stiffness
-    total = None
-    if a.omega:
-        slope = plain(freq, 1)
-        if slope is not None:
-            total = a.omega * state.basis.multiples[:, None, None] * slope
+    total = a.omega * state.basis.multiples[:, None, None] * linear.stiffness(freq, 1) if a.omega else None
     for name, rate in a.parameters.items():
-        block = by(freq, (name,))
+        block = linear.stiffness_by(freq, (name,))
         if block is not None:
             total = rate * block if total is None else total + rate * block
     return total
 
 
-def _linear_second(state: BalanceState, a: Direction, b: Direction, compliance: bool) -> ComplexArray | None:
-    """A''[a, b] or B''[a, b] per harmonic, None if zero."""
-    linear, freq = state.linear, state.frequencies
+def _linear_second(state: BalanceState, a: Direction, b: Direction) -> ComplexArray | None:
+    """A''[a, b] per harmonic, None if zero."""
+    freq, by = state.frequencies, state.linear.stiffness_by
     m = state.basis.multiples[:, None, None]
-    by = linear.compliance_by if compliance else linear.stiffness_by
-    plain = linear.compliance if compliance else linear.stiffness
     terms: list[tuple[ComplexArray | None, float | Array]] = []
     if a.omega and b.omega:
-        terms.append((plain(freq, 2), a.omega * b.omega * m**2))
+        terms.append((state.linear.stiffness(freq, 2), a.omega * b.omega * m**2))
     for one, other in ((a, b), (b, a)):
         if one.omega:
             terms += [(by(freq, (name,), 1), one.omega * rate * m) for name, rate in other.parameters.items()]
@@ -169,24 +150,13 @@ def second_derivative(state: BalanceState, a: Direction, b: Direction) -> Array:
     """R''[a, b], shape (dimension,)."""
     result = np.zeros_like(state.x)
     for block, vector in (
-        (_linear_second(state, a, b, False), state.x),
-        (_linear_change(state, a, False), b.x),
-        (_linear_change(state, b, False), a.x),
+        (_linear_second(state, a, b), state.x),
+        (_linear_change(state, a), b.x),
+        (_linear_change(state, b), a.x),
     ):
         if block is not None:
             result += apply_blocks(block, vector)
-    s_ab = _unbalanced_second(state, a, b)
-    if state.compliance is None:
-        return (result + s_ab).ravel()
-    result += apply_blocks(state.compliance, s_ab)
-    second = _linear_second(state, a, b, True)
-    if second is not None:
-        result += apply_blocks(second, state.unbalanced)
-    for one, other in ((a, b), (b, a)):
-        block = _linear_change(state, one, True)
-        if block is not None:
-            result += apply_blocks(block, _unbalanced_along(state, other))
-    return result.ravel()
+    return (result + _unbalanced_second(state, a, b)).ravel()
 
 
 def third_derivative(state: BalanceState, a: Array, b: Array, c: Array) -> Array:
@@ -211,7 +181,7 @@ class Multilinear:
                 values = self._all_values(channel, (a, b), zr, zi)
                 products = np.einsum("rsn,rn,sn->n", weights, *values)
                 total += np.multiply.outer(_project(products, zr, zi, shift, out.count), channel.out)
-        return Waves(self._response(total, out), out)
+        return Waves(total, out)
 
     def third(self, a: Waves, b: Waves, c: Waves, out: Frequencies) -> Waves:
         """R'''[a, b, c] at the frequencies `out`."""
@@ -231,7 +201,7 @@ class Multilinear:
                     spectrum -= 1j * out.values * own
                 spectrum += _project(plain, zr, zi, shift, out.count)
                 total += np.multiply.outer(spectrum, channel.out)
-        return Waves(self._response(total, out), out)
+        return Waves(total, out)
 
     def _all_values(self, channel: Channel, waves: tuple[Waves, ...], zr: Array, zi: Array) -> list[ComplexArray]:
         """Changes of q along perturbations at instants, (Q, N) each; the same wave is evaluated once."""
@@ -245,10 +215,6 @@ class Multilinear:
             rows = np.concatenate((rows, 1j * self.state.rate * a.at.values * rows))
         values: ComplexArray = wave_sums(np.ascontiguousarray(rows), zr, zi)
         return values
-
-    def _response(self, force: ComplexArray, out: Frequencies) -> ComplexArray:
-        compliance = self.state.linear.compliance(out.values * self.state.rate)
-        return force if compliance is None else np.einsum("fij,fj->fi", compliance, force)
 
 
 def _trilinear(weights: Array, a: ComplexArray, b: ComplexArray, c: ComplexArray) -> ComplexArray:

@@ -1,9 +1,9 @@
 """What is fixed of harmonic balance along a curve: channels of the elements, laws at parameter values, loads, weights.
 
-    R(X, omega, parameters) = A X + B S,    S = F(X, omega) - P(omega),
+    R(X, omega, parameters) = A X + S,    S = F(X, omega) - P(omega),
 
-with A, B from the linear part (stiffness form: A = Z, B = I, so that `R = Z X + F - P`), F the Fourier coefficients
-of the element forces (Galerkin projection) and P those of the loads. `evaluation` evaluates them at a motion. Method:
+with A from the linear part (the dynamic stiffness Z where all DOFs are unknown), F the Fourier coefficients of the
+element forces (Galerkin projection) and P those of the loads. `evaluation` evaluates them at a motion. Method:
 Cameron & Griffin, J. Appl. Mech. 56 (1989) 149-154 (alternating frequency/time).
 """
 

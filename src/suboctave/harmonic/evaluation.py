@@ -1,6 +1,6 @@
 """One evaluated motion: what harmonic balance says of it, each part computed when first needed and kept.
 
-    R = A X + B S,    S = F(X, omega) - P(omega),    dF/dX = T(f_x) + T(f_v) omega D,    F_omega = T(f_v) D X
+    R = A X + S,    S = F(X, omega) - P(omega),    dF/dX = T(f_x) + T(f_v) omega D,    F_omega = T(f_v) D X
 
 in the notation of `equations`.
 """
@@ -73,9 +73,11 @@ class HarmonicBalance(Equations):
             If an element returns a force that is not finite.
         """
         used = self.values if values is None else values
-        linear = self.linear
+        basis, linear = self.basis, self.linear
         if used is not self.values and any(used[n] != self.values[n] for n in self.matrix_names):
-            linear = self.linear.rebuilt(used)
+            linear = linear.rebuilt(used)
+        # the half-odd basis goes up to H + 1/2
+        linear = linear.covering((basis.harmonics + 0.5) / basis.nu * abs(float(omega)))
         return BalanceState(self, linear, self.shaped(np.asarray(x, float)), float(omega), used)
 
     def settle(self, x: Array, omega: float, values: Mapping[str, float] | None = None) -> HarmonicBalance:
@@ -91,8 +93,8 @@ class HarmonicBalance(Equations):
 
 
 class Balanced(NamedTuple):
-    """Element forces F and residual R, (2 H + 1, size) each; the size of R, and of the forces that balance, `|A X| + |B
-    F| + |B P|`, with residual weights: residuals are held against it.
+    """Element forces F and residual R, (2 H + 1, size) each; the size of R, and of the forces that balance, `|A X| +
+    |F| + |P|`, with residual weights: residuals are held against it.
     """
 
     force: Array
@@ -116,9 +118,8 @@ class BalanceState:
         self.rate = omega / balance.basis.nu
         #: circular frequencies of the harmonics, (H + 1,)
         self.frequencies = balance.basis.multiples * omega
-        #: A at the harmonics, (H + 1, size, size), and B, None for the identity
+        #: A at the harmonics, (H + 1, size, size)
         self.blocks = linear.stiffness(self.frequencies)
-        self.compliance = linear.compliance(self.frequencies)
         self.laws: Laws = balance.laws(values)
 
     @property
@@ -221,17 +222,12 @@ class BalanceState:
     @lazy
     def balanced(self) -> Balanced:
         """What balances: see `Balanced`."""
-        balance, compliance = self.balance, self.compliance
+        balance = self.balance
         parts, sizes = np.empty((3, *self.x.shape)), np.empty(4)
         load, weight = balance.load(self.values, self.omega), balance.scales()[1]
         balance_residual(self.x, self.blocks, self._spectra[0], load, balance.directions, weight, parts, sizes)
-        linear, force, residual = parts
         size, *forces = sizes.tolist()
-        if compliance is not None:
-            residual = linear + apply_blocks(compliance, force - load)
-            size = length(residual * weight)
-            forces[1:] = [length(apply_blocks(compliance, part) * weight) for part in (force, load)]
-        return Balanced(force, residual, size, sum(forces))
+        return Balanced(parts[1], parts[2], size, sum(forces))
 
     @property
     def unknowns(self) -> Array:
@@ -278,7 +274,7 @@ class BalanceState:
     @lazy
     def jacobian(self) -> Array:
         """R_X, shape (dimension, dimension)."""
-        return self._operator(np.zeros((self.x.size, self.x.size)), self.blocks, self.compliance, mean=True)
+        return self._add_tangent(np.zeros((self.x.size, self.x.size)), self.blocks, mean=True)
 
     def extended_jacobian(self, name: str) -> Array:
         """`[R_X R_name]`, shape (dimension, dimension + 1); name is "omega" or a parameter."""
@@ -287,7 +283,7 @@ class BalanceState:
         if "jacobian" in vars(self):
             out[:, :-1] = self.jacobian
         else:
-            out = self._operator(out, self.blocks, self.compliance, mean=True)
+            out = self._add_tangent(out, self.blocks, mean=True)
         out[:, -1] = self.residual_by(name)
         return out
 
@@ -295,16 +291,7 @@ class BalanceState:
     def half_jacobian(self) -> Array:
         """J_half: the same operator in the half-odd basis up to H + 1/2; singular at a period doubling."""
         frequencies, rows = self.basis.half_multiples * self.omega, self.balance.size * (self.basis.size + 1)
-        blocks, compliance = self.linear.stiffness(frequencies), self.linear.compliance(frequencies)
-        return self._operator(np.zeros((rows, rows)), blocks, compliance, mean=False)
-
-    def _operator(self, out: Array, blocks: ComplexArray, compliance: ComplexArray | None, mean: bool) -> Array:
-        """Add `A + B dF/dX` to zeros, whose first columns it takes."""
-        if compliance is None:
-            return self._add_tangent(out, blocks, mean)
-        out = block_diagonal(compliance, mean) @ self._add_tangent(out, blocks[:0], mean)
-        out[:, : len(out)] += block_diagonal(blocks, mean)
-        return out
+        return self._add_tangent(np.zeros((rows, rows)), self.linear.stiffness(frequencies), mean=False)
 
     @property
     def linear_jacobian(self) -> Array:
@@ -313,25 +300,17 @@ class BalanceState:
 
     def residual_by(self, name: str) -> Array:
         """R differentiated by "omega" or a parameter, shape (dimension,)."""
-        block, slope = self.linear_by(name)
+        block = self.linear_by(name)
         result = np.zeros(self.x.shape) if block is None else apply_blocks(block, self.x)
-        if slope is not None:
-            result += apply_blocks(slope, self.unbalanced)
         change = self.unbalanced_by(name)
-        if change is not None:
-            result += change if self.compliance is None else apply_blocks(self.compliance, change)
-        return result.ravel()
+        return (result if change is None else result + change).ravel()
 
-    def linear_by(self, name: str) -> tuple[ComplexArray | None, ComplexArray | None]:
-        """A and B at the harmonics differentiated by "omega" or a parameter, (H + 1, size, size); None for zero."""
-        linear, frequencies = self.linear, self.frequencies
+    def linear_by(self, name: str) -> ComplexArray | None:
+        """A at the harmonics differentiated by "omega" or a parameter, (H + 1, size, size); None for zero."""
         if name == "omega":
-            k = self.basis.multiples[:, None, None]
-            slope = linear.compliance(frequencies, 1)
-            return k * linear.stiffness(frequencies, 1), None if slope is None else k * slope
-        if name not in self.balance.matrix_names:
-            return None, None
-        return linear.stiffness_by(frequencies, (name,)), linear.compliance_by(frequencies, (name,))
+            slope: ComplexArray = self.basis.multiples[:, None, None] * self.linear.stiffness(self.frequencies, 1)
+            return slope
+        return self.linear.stiffness_by(self.frequencies, (name,)) if name in self.balance.matrix_names else None
 
     @property
     def load(self) -> Array:
@@ -394,14 +373,11 @@ class BalanceState:
     def neglected(self) -> ComplexArray:
         """Amplitudes of the harmonics H + 1 .. 2 H + 1 that the force on the motion would excite, shape (H + 1, size).
 
-        To first order `x_k = -A(k w0)^-1 B(k w0) f_k`, f_k the harmonics of the element forces beyond the basis.
+        To first order `x_k = -A(k w0)^-1 f_k`, f_k the harmonics of the element forces beyond the basis.
         """
         high, top = self.basis.harmonics, self.balance.top
         force = -2.0 * self.force_spectra.T[high + 1 :] @ self.balance.acting
         frequencies = self.rate * np.arange(high + 1.0, top + 1.0)
-        compliance = self.linear.compliance(frequencies)
-        if compliance is not None:
-            force = np.einsum("kij,kj->ki", compliance, force)
         blocks = self.linear.stiffness(frequencies)
         if self.balance.size == 1:
             return force / blocks[:, :, 0]

@@ -3,24 +3,21 @@
 Harmonic balance at a frequency Omega couples the unknown displacement amplitudes `x` (complex, `x exp(i Omega t)`)
 with the amplitudes `s` of element forces minus loads by
 
-    A(Omega) x + B(Omega) s = 0.
+    A(Omega) x + s = 0.
 
-- stiffness form: `A = K - Omega^2 M + i Omega C`, `B = I` (returned as None);
-- flexibility form, for a model condensed onto the DOFs that elements and loads touch: `A = S`, `B = S G` with G the
-  dynamic flexibility there and S a constant diagonal matrix of stiffnesses, which gives residuals the unit of forces
-  in this form too. (`S = I` will do where masses and frequencies are of the order of one.)
-
-Whatever is above asks for A, B and their derivatives with respect to Omega and the parameters, and for the matrices
-of an equation of motion with the same response (for monodromy and scaling); it never sees which form it is given. The
-equation of motion may have more DOFs than there are unknowns: `expand` takes directions from these to those.
+With all degrees of freedom unknown `A = K - Omega^2 M + i Omega C`; `condensed` eliminates those that no force acts on.
+Whatever is above asks for A and its derivatives with respect to Omega and the parameters, and for the matrices of an
+equation of motion with the same response (for monodromy and scaling); it never sees which form it is given. The
+structure has n DOFs, its equation of motion N, and `size` of them, or directions through them, are unknown.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from suboctave.compiled import kernel
 from suboctave.harmonic.basis import Array, ComplexArray
@@ -39,14 +36,8 @@ class LinearPart(Protocol):
     def stiffness(self, frequency: Array, order: int = 0) -> ComplexArray:
         """`d^order A / d Omega^order`, shape (len(frequency), size, size)."""
 
-    def compliance(self, frequency: Array, order: int = 0) -> ComplexArray | None:
-        """`d^order B / d Omega^order`, same shape; None means the identity (and zero derivatives)."""
-
     def stiffness_by(self, frequency: Array, names: tuple[str, ...], order: int = 0) -> ComplexArray | None:
         """`d^order A / d Omega^order` differentiated by one or two parameters; None if zero."""
-
-    def compliance_by(self, frequency: Array, names: tuple[str, ...], order: int = 0) -> ComplexArray | None:
-        """The same for B; None if zero."""
 
     def retain(self, direction: Array) -> Array:
         """A direction or load shape in the structure's DOFs (n,) as one in the unknown DOFs (size,).
@@ -57,8 +48,25 @@ class LinearPart(Protocol):
     def equation_of_motion(self) -> tuple[Array, Array, Array]:
         """Mass, damping, stiffness (N, N) of an equation of motion with this response, N >= size."""
 
+    def read(self, motion: Array) -> Array:
+        """The unknowns (..., size) of a motion of the structure, (..., n); of a direction, what they do along it."""
+
     def expand(self, direction: Array) -> Array:
         """A direction in the unknown DOFs (size,) as one in those of the equation of motion (N,)."""
+
+    def seen(self, direction: Array) -> Array:
+        """A direction in the structure's DOFs (..., n) as one in those of the equation of motion (..., N)."""
+
+    def recovered(self, frequency: Array, amplitudes: ComplexArray) -> ComplexArray:
+        """Complex amplitudes (F, size) of the unknowns at frequencies (F,) as those of the equation of motion, (F,
+        N).
+        """
+
+    def shaped(self, motion: NDArray[Any]) -> NDArray[Any]:
+        """A motion (..., N) of the equation of motion as one of the structure, (..., n)."""
+
+    def covering(self, frequency: float) -> LinearPart:
+        """The same part, made to serve up to a circular frequency."""
 
     def __hash__(self) -> int:
         """By identity: what depends on the linear part alone is kept with it as the key."""
@@ -82,10 +90,6 @@ class StructuralMatrices:
         """See `LinearPart.stiffness`."""
         return _blocks(self.matrices, frequency, order)
 
-    def compliance(self, frequency: Array, order: int = 0) -> None:
-        """Identity."""
-        return
-
     def stiffness_by(self, frequency: Array, names: tuple[str, ...], order: int = 0) -> ComplexArray | None:
         """See `LinearPart.stiffness_by`."""
         parts = self.system.matrix_derivatives(*names, values=self.values)
@@ -93,10 +97,6 @@ class StructuralMatrices:
             return None
         zero = np.zeros((self.size, self.size))
         return _blocks(np.array([zero if part is None else part for part in parts]), frequency, order)
-
-    def compliance_by(self, frequency: Array, names: tuple[str, ...], order: int = 0) -> None:
-        """Identity."""
-        return
 
     def retain(self, direction: Array) -> Array:
         """All DOFs are unknowns."""
@@ -110,6 +110,26 @@ class StructuralMatrices:
     def expand(self, direction: Array) -> Array:
         """The unknowns are the DOFs of the equation of motion."""
         return direction
+
+    def read(self, motion: Array) -> Array:
+        """All DOFs are unknowns."""
+        return motion
+
+    def seen(self, direction: Array) -> Array:
+        """The equation of motion is the structure's."""
+        return direction
+
+    def recovered(self, frequency: Array, amplitudes: ComplexArray) -> ComplexArray:
+        """The unknowns are the DOFs of the equation of motion."""
+        return amplitudes
+
+    def shaped(self, motion: NDArray[Any]) -> NDArray[Any]:
+        """The equation of motion is the structure's."""
+        return motion
+
+    def covering(self, frequency: float) -> StructuralMatrices:
+        """The matrices serve at any frequency."""
+        return self
 
 
 def _blocks(matrices: Array, frequency: Array, order: int) -> ComplexArray:

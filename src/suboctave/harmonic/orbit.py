@@ -10,8 +10,9 @@ from functools import cached_property
 import numpy as np
 
 from suboctave.errors import InputError, shortened
-from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis, harmonic_index, to_complex
+from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis, harmonic_index, to_complex, to_real
 from suboctave.harmonic.evaluation import BalanceState, HarmonicBalance
+from suboctave.harmonic.linear_part import LinearPart
 from suboctave.harmonic.trigonometric import motion, peak
 from suboctave.harmonic.truncation import AdaptiveHarmonics
 from suboctave.model.elements.coupled import as_coupled
@@ -29,9 +30,9 @@ class PeriodicOrbit:
     ----------
     balance
         The equations it solves (system, basis, frozen samples).
-    coefficients
-        `(a_0, a_1, b_1, ...)`, shape (2 H + 1, n): `x(t) = a_0 + sum_k a_k cos(k omega t / nu) + b_k sin(k omega t /
-        nu)`.
+    x
+        The unknowns of these equations, shape (2 H + 1, balance.size): coefficients of all degrees of freedom, or of
+        displacements along the directions that forces act on; `coefficients` has them all.
     omega
         Circular frequency of the load, rad per unit time.
     values
@@ -45,7 +46,7 @@ class PeriodicOrbit:
     """
 
     balance: HarmonicBalance
-    coefficients: Array
+    x: Array
     omega: float
     values: Mapping[str, float]
     residual: float
@@ -72,19 +73,36 @@ class PeriodicOrbit:
     @property
     def own_period(self) -> int:
         """After how many load periods the motion first repeats; `basis.nu` unless its sub-harmonics vanish."""
-        nu, sizes = self.basis.nu, np.linalg.norm(self.amplitudes * self.balance.scales()[0], axis=1)
+        nu, sizes = self.basis.nu, np.linalg.norm(to_complex(self.x) * self.balance.scales()[0], axis=1)
         k = np.arange(len(sizes))
         shares = ((d, float(np.linalg.norm(sizes[k % (nu // d) != 0]))) for d in range(1, nu) if nu % d == 0)
         return next((d for d, rest in shares if rest <= _REPEATED * np.linalg.norm(sizes)), nu)
 
     def state(self) -> BalanceState:
         """The harmonic-balance equations evaluated at this orbit."""
-        return self.balance.at(self.coefficients, self.omega, self.values)
+        return self.balance.at(self.x, self.omega, self.values)
 
     @cached_property
+    def _linear(self) -> LinearPart:
+        """The linear part at the motion's parameters and frequencies."""
+        return self.state().linear
+
+    @cached_property
+    def _moving(self) -> ComplexArray:
+        """Complex amplitudes of the linear part's equation of motion, (H + 1, N)."""
+        return self._linear.recovered(self.basis.multiples * self.omega, to_complex(self.x))
+
+    @property
     def amplitudes(self) -> ComplexArray:
         """Complex amplitudes `c_k = a_k - i b_k`, shape (H + 1, n): `x = Re sum_k c_k exp(i k omega t / nu)`."""
-        return to_complex(self.coefficients)
+        return self._linear.shaped(self._moving)
+
+    @property
+    def coefficients(self) -> Array:
+        """`(a_0, a_1, b_1, ...)`, shape (2 H + 1, n): `x(t) = a_0 + sum_k a_k cos(k omega t / nu) + b_k sin(k omega t /
+        nu)`, of all degrees of freedom.
+        """
+        return to_real(self.amplitudes)
 
     def displacement(self, t: Array | float) -> Array:
         """x at the times t; shape (n,) for a number, (n, len(t)) for an array (a `Trajectory` has time first)."""
@@ -105,7 +123,7 @@ class PeriodicOrbit:
         except (TypeError, ValueError, OverflowError):
             raise InputError(f"t must be a time or an array of times, not {shortened(t)}") from None
         waves = np.exp(1j * np.multiply.outer(times, rate)) * (1j * rate) ** order
-        result = np.real(waves @ self.amplitudes).T
+        result = self._linear.shaped(np.real(waves @ self._moving)).T
         return result[:, 0] if np.ndim(t) == 0 else result
 
     def harmonic(self, k: float, dof: int = 0) -> complex:
@@ -156,7 +174,7 @@ class PeriodicOrbit:
             )
         unit = np.zeros(n)
         unit[dof] = 1.0
-        c: ComplexArray = self.amplitudes @ self.balance.linear.retain(unit)
+        c: ComplexArray = self._moving @ self._linear.seen(unit)
         return c * (1j * self.basis.multiples * self.omega) ** derivative if derivative else c
 
     def __repr__(self) -> str:

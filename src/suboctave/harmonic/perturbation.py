@@ -66,9 +66,6 @@ def operator(state: BalanceState, kind: Kind, kappa: float = 0.0) -> np.ndarray:
             for row in np.flatnonzero(channel.out):
                 for column in np.flatnonzero(d):
                     out[:, row, :, column] += channel.out[row] * d[column] * matrix
-    compliance = state.linear.compliance(frequency)
-    if compliance is not None:
-        out = np.einsum("fij,fjkl->fikl", compliance, out)
     index = np.arange(count)
     out[index, :, index, :] += state.linear.stiffness(frequency)
     return out.reshape(count * size, count * size)
@@ -92,32 +89,19 @@ class _Form:
         free = kappa if kind is Kind.FREE else 0.0
         #: derivatives of the frequencies by omega; kappa is kept
         self.by_omega = (self.frequency - free) / state.omega
-        self.compliance = state.linear.compliance(self.frequency)
-        #: the left vector as the element forces see it
-        self.force_u = self.u if self.compliance is None else np.einsum("fji,fj->fi", self.compliance.conj(), self.u)
 
     def rows(self, channel: Channel) -> ComplexArray:
         """The right vector along what a channel reads, (Q, F)."""
         along = (self.v @ channel.ins.T).T
         return np.concatenate((along, 1j * self.frequency * along)) if channel.moving else along
 
-    def drive(self) -> ComplexArray:
-        """What all elements make of the right vector, (F, size)."""
-        total = np.zeros_like(self.v)
-        for channel in self.state.channels:
-            total += np.multiply.outer(applied(channel.spectra[1:], self.rows(channel)), channel.out)
-        return total
-
     def by_frequency(self) -> ComplexArray:
         """Derivatives by the frequency of every wave, (F,)."""
         linear = self.state.linear
         total = np.sum(self.u.conj() * _per_wave(linear.stiffness(self.frequency, 1), self.v), axis=1)
-        slope = linear.compliance(self.frequency, 1)
-        if slope is not None:
-            total += np.sum(self.u.conj() * _per_wave(slope, self.drive()), axis=1)
         for channel in self.state.channels:
             for i, d in enumerate(channel.ins if channel.moving else ()):
-                pulled = applied(channel.damping(i)[None], (self.force_u @ channel.out)[None])
+                pulled = applied(channel.damping(i)[None], (self.u @ channel.out)[None])
                 total += pulled.conj() * 1j * (self.v @ d)
         return total
 
@@ -125,7 +109,7 @@ class _Form:
         """Derivatives by the coefficients, (2 H + 1, size), and by omega at kept frequencies of the perturbation."""
         along, high, free = channel.along, self.state.basis.harmonics, self.kind is Kind.FREE
         # the common factor exp(i f_0 tau) of all waves cancels in conj(left) * right
-        waves = np.concatenate(((self.force_u @ channel.out)[None], self.rows(channel)))
+        waves = np.concatenate(((self.u @ channel.out)[None], self.rows(channel)))
         parts = 2 * along.size if free else along.size
         by_state, by_omega = np.zeros((parts, 2 * high + 1)), 0.0
         for zr, zi, weights in channel.second:
@@ -198,14 +182,11 @@ def _form_rate(form: _Form, name: str) -> complex:
     state, linear = form.state, form.state.linear
     rate = 0j
     for channel, change in state.changes_by(name):
-        rate += complex(np.vdot(form.force_u @ channel.out, applied(change[1:], form.rows(channel))))
+        rate += complex(np.vdot(form.u @ channel.out, applied(change[1:], form.rows(channel))))
     if name in state.balance.matrix_names:
         block = linear.stiffness_by(form.frequency, (name,))
         if block is not None:
             rate += complex(np.vdot(form.u, _per_wave(block, form.v)))
-        block = linear.compliance_by(form.frequency, (name,))
-        if block is not None:
-            rate += complex(np.vdot(form.u, _per_wave(block, form.drive())))
     return rate
 
 
@@ -219,23 +200,18 @@ def parameter_gradient(state: BalanceState, left: Array, name: str, names: tuple
     residual's size.
     """
     shaped = state.balance.shaped(left)
-    # A_name and B_name per harmonic, transposed in the sense of the real basis: conjugate transpose of the complex
-    # blocks
-    block, slope = state.linear_by(name)
+    # A_name per harmonic, transposed in the sense of the real basis: conjugate transpose of the complex blocks
+    block = state.linear_by(name)
     gx = np.zeros_like(state.x)
     if block is not None:
         gx += apply_blocks(_adjoint(block), shaped)
-    if slope is not None:
-        pulled = apply_blocks(_adjoint(slope), shaped)
-        gx += (state.force_jacobian.T @ pulled.ravel()).reshape(gx.shape)
-    u_force = shaped if state.compliance is None else apply_blocks(_adjoint(state.compliance), shaped)
     if name == "omega":
         for channel in state.channels:
             if channel.moving:
-                gx += _omega_gradient(state, channel, u_force @ channel.out)
+                gx += _omega_gradient(state, channel, shaped @ channel.out)
     else:
         for channel, change in state.changes_by(name):
-            gx += along_inputs_of_form(state, channel, change[1:], u_force @ channel.out)
+            gx += along_inputs_of_form(state, channel, change[1:], shaped @ channel.out)
     zero = np.zeros_like(state.x)
     rates = {
         other: complex(left @ second_derivative(state, Direction(zero, {name: 1.0}), Direction(zero, {other: 1.0})))
@@ -298,12 +274,7 @@ def operator_along(
     """
     form, at = _Form(state, kind, right, right, kappa), Frequencies.of(state, kind, kappa)
     linear, frequency = state.linear, form.frequency
-    slopes = [(linear.stiffness(frequency, 1), form.v)]
-    compliance_slope = linear.compliance(frequency, 1)
-    drive = form.drive() if form.compliance is not None else form.v
-    if compliance_slope is not None:
-        slopes.append((compliance_slope, drive))
-    turning = sum(_per_wave(slope, vector) for slope, vector in slopes)
+    turning = _per_wave(linear.stiffness(frequency, 1), form.v)
     columns = []
     for j, a in enumerate(directions):
         turn = form.by_omega * a.omega
@@ -312,15 +283,11 @@ def operator_along(
         force = np.zeros_like(form.v)
         for channel in state.channels:
             force += np.multiply.outer(_channel_along(form, channel, a, turn), channel.out)
-        column = force if form.compliance is None else np.einsum("fij,fj->fi", form.compliance, force)
-        column = column + turn[:, None] * turning
+        column = force + turn[:, None] * turning
         for name, rate in a.parameters.items():
-            for block, vector in (
-                (linear.stiffness_by(frequency, (name,)), form.v),
-                (linear.compliance_by(frequency, (name,)), drive),
-            ):
-                if block is not None:
-                    column += rate * np.einsum("fij,fj->fi", block, vector)
+            block = linear.stiffness_by(frequency, (name,))
+            if block is not None:
+                column += rate * _per_wave(block, form.v)
         columns.append(Waves(column, at).vector(kind))
     return np.stack(columns, axis=1)
 

@@ -180,7 +180,7 @@ class MonotonePiece:
             weights = [np.prod((place - np.delete(s, k)) / (s[k] - np.delete(s, k))) for k in range(len(s))]
             orbit = max((node.orbit for node in nodes), key=lambda o: o.basis.harmonics)
             basis = orbit.basis
-            motions = (node.orbit.basis.resized(node.orbit.coefficients, basis) for node in nodes)
+            motions = (node.orbit.basis.resized(node.orbit.x, basis) for node in nodes)
             x = np.asarray(sum(w * motion for w, motion in zip(weights, motions, strict=True)))
             try:
                 return self._corrected(value, orbit, x, float(self.across(value)))
@@ -196,7 +196,7 @@ class MonotonePiece:
             share, step = 0.0, 0.5
             while step > _SMALLEST:
                 ahead = min(1.0, share + step)
-                x = orbit.basis.resized(orbit.coefficients, orbit.basis)
+                x = orbit.basis.resized(orbit.x, orbit.basis)
                 try:
                     point = self._corrected(start + ahead * (value - start), orbit, x, orbit.omega)
                 except ConvergenceError as why:

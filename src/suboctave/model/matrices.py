@@ -67,6 +67,17 @@ class MatrixCoefficient:
         """The matrix at these values as it was given, dense or sparse."""
         return self.sparse_value(values) if self.sparse else self.value(values)
 
+    def projected(self, shapes: Array) -> MatrixCoefficient:
+        """`shapes^T A shapes` for the columns of shapes (n, r), an r x r matrix in the same parameters."""
+        base, *patterns = (
+            np.ascontiguousarray(shapes.T @ np.asarray(part @ shapes)) for part in (self._base, *self._patterns)
+        )
+        return MatrixCoefficient(base, list(zip(self.coefficients, patterns, strict=True)), self.what)
+
+    @property
+    def _patterns(self) -> tuple[Any, ...]:
+        return tuple(pattern for _, pattern in self._terms)
+
     def products(self, vector: Array) -> list[tuple[Coefficient, Array]]:
         """Its product with a vector (n,), as pairs of an expression and a vector that add up to it."""
         parts = [(coefficient(1.0), self._base), *self._terms]

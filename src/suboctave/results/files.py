@@ -25,6 +25,7 @@ from suboctave.curves.trace import Audit, BranchPoint, TrackedPoint, Unsettled
 from suboctave.errors import InputError
 from suboctave.floquet.result import FloquetResult
 from suboctave.harmonic.basis import HarmonicBasis
+from suboctave.harmonic.condensed import Condensed, linear_part_of
 from suboctave.harmonic.evaluation import HarmonicBalance
 from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
 from suboctave.harmonic.orbit import PeriodicOrbit
@@ -114,10 +115,10 @@ register(
 
 def _coefficients(prefix: str, dimension: str, orbits: Sequence[PeriodicOrbit]) -> tuple[Any, ...]:
     """The Fourier coefficients of several motions, padded to the longest."""
-    sizes = np.max([o.coefficients.shape for o in orbits], axis=0) if orbits else (0, 0)
+    sizes = np.max([o.x.shape for o in orbits], axis=0) if orbits else (0, 0)
     table = np.zeros((len(orbits), *sizes))
     for row, orbit in zip(table, orbits, strict=True):
-        row[: orbit.coefficients.shape[0], : orbit.coefficients.shape[1]] = orbit.coefficients
+        row[: orbit.x.shape[0], : orbit.x.shape[1]] = orbit.x
     meaning = "a_0, a_1, b_1, ... of x(t) = a_0 + sum a_k cos(k w t) + b_k sin(k w t), w = omega / period"
     # a dimension of its own for each: the longest motion among the points is not that among the events
     shape = (dimension, f"{prefix}coefficient", "unknown" if orbits else f"{prefix}unknown")
@@ -154,6 +155,8 @@ class _Writer:
                 "samples": tuple(None if s is None else int(s) for s in balance.samples),
                 "values": tuple(float(balance.values[name]) for name in balance.system.parameters),
                 "linear": "" if isinstance(linear, StructuralMatrices) else type(linear).__name__,
+                # what a condensed part is made for, None where nothing depends on it
+                "covers": linear.made_for if isinstance(linear, Condensed) else None,
             }
             self._numbers[id(balance)] = self._listed("discretisations", shared), balance
         return self._numbers[id(balance)][0]
@@ -190,18 +193,28 @@ class _Reader:
         self.tables = self.record["tables"]
         arrays = system_arrays(dataset)
         self.systems = [build(described, arrays, allow_code) for described in self.tables["systems"]]
+        self._parts: dict[tuple[int, str], LinearPart] = {}
         self.balances = [self._balance(d, linear) for d in self.tables["discretisations"]]
 
     def _balance(self, stated: Mapping[str, Any], linear: LinearPart | None) -> HarmonicBalance:
         # files of earlier versions name harmonics that were left out: their coefficients are zero
         system, other = self.systems[stated["system"]], stated["linear"]
+        values = dict(zip(system.parameters, stated["values"], strict=True))
+        if other == Condensed.__name__ and linear is None:
+            linear = self._condensed(system, stated.get("covers")).rebuilt(values)
         if other and linear is None:
             raise InputError(
                 f"this branch was computed with another linear part, a {other}: make it again and give it as linear="
             )
-        values = dict(zip(system.parameters, stated["values"], strict=True))
         basis = HarmonicBasis(stated["harmonics"], stated["nu"])
         return HarmonicBalance(system, basis, values, linear if other else None, stated["samples"])
+
+    def _condensed(self, system: System, made_for: Mapping[str, Any] | None) -> LinearPart:
+        """The condensed linear part of a system, one for all its motions."""
+        key = id(system), str(made_for)
+        if key not in self._parts:
+            self._parts[key] = linear_part_of(system, None, **(made_for or {}))
+        return self._parts[key]
 
     def motion(self, prefix: str, i: int, stored: Sequence[Any], *numbers: Any) -> tuple[Any, FloquetResult]:
         """A motion with its verdict; `numbers`: omega, values of the parameters, residual, what was neglected of it."""

@@ -146,12 +146,10 @@ class BranchReadings:
         names = [*_OF_A_DOF, "harmonic_1", "phase_1"]
         names += [f"peak_force_{i}" for i in range(len(self.system.elements))]
         names += [f"{what}_{i}" for i in gapped_elements(self.system) for what in _OF_A_GAP]
-        orbit = self.orbits[0]
-        if orbit.balance.size == self.system.n:
-            names.append("transmitted_force")
-            r = np.ones(self.system.n)
-            if any(of_harmonic(ground_and_load(o, r)[1], 1, o.basis.nu) for o in self.orbits):
-                names.append("transmissibility")
+        names.append("transmitted_force")
+        r = np.ones(self.system.n)
+        if any(of_harmonic(ground_and_load(o, r)[1], 1, o.basis.nu) for o in self.orbits):
+            names.append("transmissibility")
         return names
 
 
@@ -388,15 +386,14 @@ def translation(n: int, direction: ArrayLike | None) -> Array:
 def ground_and_load(orbit: PeriodicOrbit, r: Array) -> tuple[ComplexArray, ComplexArray]:
     """Complex amplitudes (H + 1,) of the force on the ground and of the force applied, along r."""
     state, balance = orbit.state(), orbit.balance
-    if balance.size != balance.system.n:
-        raise InputError(
-            "the force on the ground needs the motion of the whole structure; this model is condensed onto "
-            f"{balance.size} of its {balance.system.n} degrees of freedom"
-        )
-    _, damping, stiffness = balance.system.matrices(orbit.values)
-    rate = 1j * orbit.basis.multiples * orbit.omega
-    held = orbit.amplitudes @ (r @ stiffness) + rate * (orbit.amplitudes @ (r @ damping))
-    return held + to_complex(state.force) @ r, to_complex(balance.load(orbit.values, orbit.omega)) @ r
+    frequencies, linear = orbit.basis.multiples * orbit.omega, state.linear
+    motion = linear.recovered(frequencies, to_complex(orbit.x))
+    damping, stiffness = (
+        motion @ linear.seen(r @ part.compact(orbit.values))
+        for part in (balance.system.damping, balance.system.stiffness)
+    )
+    held, along = stiffness + 1j * frequencies * damping, linear.read(r)
+    return held + to_complex(state.force) @ along, to_complex(balance.load(orbit.values, orbit.omega)) @ along
 
 
 def of_harmonic(amplitudes: ComplexArray, k: float, nu: int) -> float:

@@ -150,7 +150,9 @@ def motion_dataset(
     state = orbit.state()
     unit = np.zeros(system.n)
     unit[chosen] = 1.0
-    variables["amplitude_of_neglected"] = ("neglected", state.neglected @ orbit.balance.linear.retain(unit))
+    beyond = (high + 1.0 + np.arange(high + 1)) / nu * orbit.omega
+    lacking = state.linear.recovered(beyond, state.neglected)
+    variables["amplitude_of_neglected"] = ("neglected", lacking @ state.linear.seen(unit))
     wanted = [check_element(system, index) for index in elements]
     force = [force_along(state, index)(tau) for index in wanted]
     variables["force"] = (("element", "sample"), np.reshape(force, (len(wanted), count + 1)))

@@ -316,7 +316,7 @@ def rebased(orbit: PeriodicOrbit, a: Sample) -> PeriodicOrbit:
     balance = a.curve.balance
     if orbit.basis.nu == balance.basis.nu:
         return orbit
-    return replace(orbit, balance=balance, coefficients=orbit.basis.resized(orbit.coefficients, balance.basis))
+    return replace(orbit, balance=balance, x=orbit.basis.resized(orbit.x, balance.basis))
 
 
 #: points on the way to an end at which a parameter may turn before it, and a way for differences

@@ -60,7 +60,7 @@ def curve_through(
     widths = {**(item.context or {}).get("bounds", {})} if is_extremum(item) else {}
     widths |= ranges or {}
     spans = [abs(float(widths[n][1]) - float(widths[n][0])) if n in widths else abs(item.parameter(n)) for n in names]
-    x = orbit.basis.resized(orbit.coefficients, basis)
+    x = orbit.basis.resized(orbit.x, basis)
     balance = HarmonicBalance(orbit.system, basis, linear=own_linear_part(orbit)).settle(x, orbit.omega)
     state = balance.at(x, orbit.omega)
     augmentation, extra = formulation.equations(kind_of(item)).through(item, state, names)

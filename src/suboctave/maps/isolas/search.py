@@ -563,10 +563,8 @@ def _unscaled(orbit: PeriodicOrbit, system: System) -> PeriodicOrbit:
     """A motion of the system with scaled loads, at their own level, as one of the system itself."""
     values = {name: value for name, value in orbit.values.items() if name != _LEVEL}
     balance = HarmonicBalance(system, orbit.basis, linear=own_linear_part(orbit))
-    balance = balance.settle(orbit.coefficients, orbit.omega)
-    return PeriodicOrbit(
-        balance, orbit.coefficients, orbit.omega, values, orbit.residual, orbit.truncation, orbit.adaptive
-    )
+    balance = balance.settle(orbit.x, orbit.omega)
+    return PeriodicOrbit(balance, orbit.x, orbit.omega, values, orbit.residual, orbit.truncation, orbit.adaptive)
 
 
 def _from_resonances(search: Search, orders: Sequence[int] | None, seeds: Seeds | None) -> None:

@@ -1,0 +1,386 @@
+"""A linear part whose unknowns are the displacements along the directions that forces act on, and no others.
+
+Of a structure of any size, as it is or projected (`reduction`), nothing but the displacements q along the m directions
+of its elements and loads need be unknown: all else follows from them. With static modes E (`D E = 1`, a unit of one
+displacement, none of the others) and vibrations N of the structure held there (`D N = 0`), `y = E q + N z`,
+
+    Z_qq q + Z_qz z = -s,    Z_zq q + Z_zz z = 0,        A = Z_qq - Z_qz Z_zz^-1 Z_zq,    A q + s = 0.
+
+These are the coordinates of Craig & Bampton (AIAA Journal 6 (1968) 1313-1319); for damping in proportion to mass and
+stiffness `Z_zz` is diagonal. A is exactly the inverse of the dynamic flexibility at q, but no difference of large
+numbers: with `S = K + s^2 M`, E made by the inverse of S, the coupling is `N^T (K - S) E = -s^2 N^T M E`. It exists for
+bodies that only the elements hold, where the flexibility is infinite at rest.
+
+Of the determinant of the whole dynamic stiffness A lacks the factors of Z_zz, at the mean its static part and elsewhere
+the square of a modulus: the signs of determinants that bifurcations are told by are the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eigh
+
+from suboctave.errors import InputError
+from suboctave.harmonic.basis import Array, ComplexArray
+from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
+from suboctave.harmonic.reduction import Projected, Reduction
+from suboctave.lazy import lazy
+from suboctave.model.matrices import MatrixCoefficient
+from suboctave.model.system import System
+
+#: part of a direction that others do not hold, relative, below which it depends on them
+_DEPENDENT = 1e-9
+#: entries of a matrix relative to its diagonal that are rounding
+_ROUNDING = 1e-12
+#: growth of the highest frequency that a basis is made for, when motions go beyond it
+_BEYOND = 1.5
+
+
+class Blocks(NamedTuple):
+    """A matrix in the coordinates (q, z), a stack of one per frequency: qq (F, m, m), qz (F, m, s), zq (F, s, m) and
+    zz (F, s, s), or its diagonal (F, s).
+    """
+
+    qq: ComplexArray
+    qz: ComplexArray
+    zq: ComplexArray
+    zz: ComplexArray
+
+    def inner(self, vectors: ComplexArray) -> ComplexArray:
+        """`Z_zz v`, v (F, s, m)."""
+        return self.zz[:, :, None] * vectors if self.zz.ndim == 2 else self.zz @ vectors
+
+    def solved(self, vectors: ComplexArray) -> ComplexArray:
+        """`Z_zz^-1 v`."""
+        if self.zz.ndim == 2:
+            return vectors / self.zz[:, :, None]
+        return np.asarray(np.linalg.solve(self.zz, vectors), dtype=complex)
+
+    def transposed(self) -> Blocks:
+        """Of the transposed matrices."""
+        zz = self.zz if self.zz.ndim == 2 else _transposed(self.zz)
+        return Blocks(_transposed(self.qq), _transposed(self.zq), _transposed(self.qz), zz)
+
+
+class Stack(NamedTuple):
+    """M, C, K in the coordinates (q, z), all entries in a row, (3, .); how many q and z; if zz is a diagonal."""
+
+    entries: ComplexArray
+    sizes: tuple[int, int]
+    diagonal: bool
+
+    @classmethod
+    def of(cls, parts: Sequence[tuple[Array, ...]]) -> Stack:
+        """From qq, qz, zq, zz of each."""
+        diagonal = all(_is_diagonal(part[3]) for part in parts)
+        if diagonal:
+            parts = [(*part[:3], part[3].diagonal()) for part in parts]
+        rows = [np.concatenate([one.ravel() for one in part]) for part in parts]
+        return cls(np.array(rows, dtype=complex), parts[0][1].shape, diagonal)
+
+    def at(self, frequency: Array, order: int) -> Blocks:
+        """`K - Omega^2 M + i Omega C` at frequencies, differentiated by Omega."""
+        w, factors = frequency, np.zeros((len(frequency), 3), dtype=complex)
+        factors[:, 0] = -w * w if order == 0 else -2.0 * w if order == 1 else -2.0
+        factors[:, 1] = 1j * w if order == 0 else 1j if order == 1 else 0.0
+        factors[:, 2] = 1.0 if order == 0 else 0.0
+        values, (m, s), count = factors @ self.entries, self.sizes, len(frequency)
+        a, b, c = m * m, m * m + m * s, m * m + 2 * m * s
+        inner = values[:, c:] if self.diagonal else values[:, c:].reshape(count, s, s)
+        return Blocks(
+            values[:, :a].reshape(count, m, m),
+            values[:, a:b].reshape(count, m, s),
+            values[:, b:c].reshape(count, s, m),
+            inner,
+        )
+
+
+def _transposed(matrices: ComplexArray) -> ComplexArray:
+    return matrices.transpose(0, 2, 1)
+
+
+class Condensed:
+    """The condensed linear part of a system at values of its parameters; made by `linear_part_of`.
+
+    `size` unknowns, `covers` the highest circular frequency that its basis is made for, `error` of its flexibility
+    there, relative.
+    """
+
+    def __init__(self, reduction: Reduction, projected: Projected, values: Mapping[str, float]) -> None:
+        self.reduction, self.projected, self.values = reduction, projected, dict(values)
+        self.system = reduction.system
+        self.size = len(reduction.directions)
+        self.covers, self.error = projected.covers, projected.error
+        #: the part at the last other values, and one that covers more
+        self._other: Condensed | None = None
+        self._wider: Condensed | None = None
+        #: what was asked for last, by frequencies
+        self._last: tuple[Array, tuple[Blocks, ComplexArray, ComplexArray]] | None = None
+        #: M, C, K, (3, r, r)
+        self._matrices = np.array([matrix.value(values) for matrix in projected.matrices])
+
+    @property
+    def made_for(self) -> dict[str, Any] | None:
+        """What its basis is made for, arguments of `linear_part_of`; None where it depends on none."""
+        if self.projected.shapes is None:
+            return None
+        return {"frequency": self.covers, "scale": self.reduction.scale, "observed": list(self.reduction.observed)}
+
+    @property
+    def frequencies(self) -> Array:
+        """Natural frequencies of the structure as seen from its unknowns, rad per unit time, ascending, (N,); 0 for
+        rigid-body motions.
+        """
+        mass, _, stiffness = self._matrices
+        values = eigh(0.5 * (stiffness + stiffness.T), 0.5 * (mass + mass.T), eigvals_only=True)
+        rigid = np.abs(values) <= 1e-10 * np.abs(np.median(values))
+        return np.sqrt(np.where(rigid, 0.0, np.maximum(values, 0.0)))
+
+    def __repr__(self) -> str:
+        lowest = self.frequencies[:6]
+        shown = ", ".join(f"{w:.6g}" for w in lowest), ", ".join(f"{w / (2.0 * np.pi):.6g}" for w in lowest)
+        whole = self.projected.shapes is None
+        modes = "as it is" if whole else f"{len(self._matrices[0])} modes"
+        lines = [
+            f"Linear part: {self.system.n} degrees of freedom, {modes}, {self.size} unknown displacements",
+            f"  natural frequencies {shown[0]} rad per unit time",
+            f"                      {shown[1]} Hz",
+        ]
+        if not whole:
+            lines.append(f"  for frequencies up to {self.covers:.6g}; error of the flexibility there {self.error:.1e}")
+        return "\n".join(lines)
+
+    # ------------------------------------------------------------------------------------------------- other values
+    def rebuilt(self, values: Mapping[str, float]) -> Condensed:
+        """The same part at other parameter values."""
+        if self._other is None or self._other.values != values:
+            self._other = Condensed(self.reduction, self.reduction.covering(self.covers, values), values)
+        return self._other
+
+    def covering(self, frequency: float) -> Condensed:
+        """This part, or one that serves up to a frequency beyond what it covers."""
+        if frequency <= self.covers * (1.0 + 1e-9):
+            return self
+        if self._wider is None or self._wider.covers < frequency:
+            projected = self.reduction.covering(_BEYOND * frequency, self.values)
+            self._wider = Condensed(self.reduction, projected, self.values)
+        return self._wider
+
+    # -------------------------------------------------------------------------------------------------- coordinates
+    @lazy
+    def _coordinates(self) -> tuple[Array, Array, Array]:
+        """E (r, m), N (r, s), and `D S^-1 D^T` inverted."""
+        mass, _, stiffness = self._matrices
+        mass, stiffness = 0.5 * (mass + mass.T), 0.5 * (stiffness + stiffness.T)
+        values, modes = eigh(stiffness, mass)
+        # a unit of stiffness that the structure has, also where some of it moves freely
+        sizes = np.sort(np.abs(values))
+        unit = sizes[np.argmax(sizes > 1e-9 * np.median(sizes))]
+        self._unit = unit
+        if not np.all(values > -0.5 * unit):
+            unit = self._unit = 2.0 * float(-values.min())
+        seen = self.projected.seen @ modes
+        weight = 1.0 / (values + unit)
+        held = np.linalg.inv((seen * weight) @ seen.T)
+        static = modes @ ((weight[:, None] * seen.T) @ held)
+        # orthonormal vibrations that are not seen: the rest of an orthogonal matrix
+        null = np.linalg.qr(seen.T, mode="complete")[0][:, self.size :]
+        _, turn = eigh((null * values[:, None]).T @ null) if null.shape[1] else (None, np.zeros((0, 0)))
+        return static, modes @ (null @ turn), held
+
+    def _split(self, matrices: Array) -> list[tuple[Array, Array, Array, Array]]:
+        """Matrices (3, r, r) in the coordinates (q, z), each as qq, qz, zq, zz."""
+        static, free, _ = self._coordinates
+        left = np.concatenate((static, free), axis=1).T
+        m, parts = self.size, []
+        for matrix in matrices:
+            whole = left @ matrix @ left.T
+            parts.append((whole[:m, :m], whole[:m, m:], whole[m:, :m], whole[m:, m:]))
+        return parts
+
+    @lazy
+    def _own(self) -> Stack:
+        """M, C, K in the coordinates (q, z)."""
+        _, _, held = self._coordinates
+        mass, damping, _ = self._split(self._matrices)
+        k = self._matrices[2]
+        skew = self._split(0.5 * (k - k.T)[None])[0]
+        # K = S - unit M, and S has no coupling
+        coupled = (held - self._unit * mass[0], -self._unit * mass[1], -self._unit * mass[2])
+        whole = (*coupled, self._split(0.5 * (k + k.T)[None])[0][3])
+        stiffness = tuple(one + other for one, other in zip(whole, skew, strict=True))
+        return Stack.of([mass, damping, stiffness])
+
+    # ------------------------------------------------------------------------------------------------------- blocks
+    def _blocks(self, frequency: Array, names: tuple[str, ...] = (), order: int = 0) -> Blocks | None:
+        """Z in the coordinates (q, z), differentiated; None for zero."""
+        if not names:
+            return self._own.at(frequency, order)
+        derivatives = [_derivative(matrix, names, self.values) for matrix in self.projected.matrices]
+        if all(one is None for one in derivatives):
+            return None
+        zero = np.zeros_like(self._matrices[0])
+        parts = self._split(np.array([zero if one is None else one for one in derivatives]))
+        return Stack.of(parts).at(frequency, order)
+
+    def _eliminated(self, frequency: Array) -> tuple[Blocks, ComplexArray, ComplexArray]:
+        """Z at frequencies, `Z_zz^-1 Z_zq`, and the transpose of `Z_qz Z_zz^-1`; what was asked for last is kept."""
+        if self._last is None or self._last[0] is not frequency:
+            whole = self._own.at(frequency, 0)
+            right = whole.solved(whole.zq)
+            turned = whole.transposed()
+            left = right if self._symmetric else turned.solved(turned.zq)
+            self._last = frequency, (whole, right, left)
+        return self._last[1]
+
+    def _differentiated(self, frequency: Array, by: tuple[tuple[tuple[str, ...], int], ...]) -> ComplexArray | None:
+        """A, differentiated by at most two things: each some names, or none and an order in Omega of one."""
+        whole, right, left = self._eliminated(frequency)
+        if not by:
+            result: ComplexArray = whole.qq - whole.qz @ right
+            return result
+        names = tuple(name for one, _ in by for name in one)
+        total = self._blocks(frequency, names, sum(order for _, order in by))
+        first = [self._blocks(frequency, *one) for one in by]
+        result = np.zeros_like(whole.qq)
+        if total is not None:
+            result += total.qq - total.qz @ right + _transposed(left) @ (total.inner(right) - total.zq)
+        elif len(by) == 1:
+            return None
+        changes = [one for one in first if one is not None]
+        if len(changes) == 2:
+            (left_a, right_a), (left_b, right_b) = (
+                (one.transposed().zq - one.transposed().inner(left), one.zq - one.inner(right)) for one in changes
+            )
+            result -= _transposed(left_a) @ whole.solved(right_b) + _transposed(left_b) @ whole.solved(right_a)
+        return result
+
+    @lazy
+    def _symmetric(self) -> bool:
+        return all(np.abs(m - m.T).max() <= _ROUNDING * np.abs(m).max() for m in self._matrices)
+
+    # ----------------------------------------------------------------------------------------------------- contract
+    def stiffness(self, frequency: Array, order: int = 0) -> ComplexArray:
+        """See `LinearPart.stiffness`."""
+        result = self._differentiated(frequency, (((), 1),) * order)
+        assert result is not None
+        return np.ascontiguousarray(result)
+
+    def stiffness_by(self, frequency: Array, names: tuple[str, ...], order: int = 0) -> ComplexArray | None:
+        """See `LinearPart.stiffness_by`."""
+        by = (*(((name,), 0) for name in names), *(((), 1),) * order)
+        result = self._differentiated(frequency, by)
+        return None if result is None else np.ascontiguousarray(result)
+
+    def retain(self, direction: Array) -> Array:
+        """See `LinearPart.retain`."""
+        return coordinates_among(self.reduction.directions, direction)
+
+    def equation_of_motion(self) -> tuple[Array, Array, Array]:
+        """M, C, K of the structure in its basis."""
+        mass, damping, stiffness = self._matrices
+        return mass, damping, stiffness
+
+    def read(self, motion: Array) -> Array:
+        """See `LinearPart.read`."""
+        result: Array = motion @ self.reduction.directions.T
+        return result
+
+    def expand(self, direction: Array) -> Array:
+        """See `LinearPart.expand`."""
+        result: Array = direction @ self.projected.seen
+        return result
+
+    def seen(self, direction: Array) -> Array:
+        """See `LinearPart.seen`."""
+        shapes = self.projected.shapes
+        return direction if shapes is None else direction @ shapes
+
+    def shaped(self, motion: NDArray[Any]) -> NDArray[Any]:
+        """See `LinearPart.shaped`."""
+        shapes = self.projected.shapes
+        return motion if shapes is None else motion @ shapes.T
+
+    def recovered(self, frequency: Array, amplitudes: ComplexArray) -> ComplexArray:
+        """See `LinearPart.recovered`."""
+        static, free, _ = self._coordinates
+        inner = (self._eliminated(frequency)[1] @ amplitudes[:, :, None])[:, :, 0]
+        result: ComplexArray = amplitudes @ static.T - inner @ free.T
+        return result
+
+
+def _is_diagonal(matrix: Array) -> bool:
+    size = np.sqrt(np.abs(np.multiply.outer(matrix.diagonal(), matrix.diagonal())))
+    beside = np.abs(matrix - np.diag(matrix.diagonal()))
+    return bool(np.all(beside <= _ROUNDING * np.maximum(size, np.abs(matrix).max() * _ROUNDING)))
+
+
+def _derivative(matrix: MatrixCoefficient, names: tuple[str, ...], values: Mapping[str, float]) -> Array | None:
+    derived: MatrixCoefficient | None = matrix
+    for name in names:
+        derived = derived and derived.derivative(name)
+    return None if derived is None else derived.value(values)
+
+
+# ------------------------------------------------------------------------------------------------------- which form
+def linear_part_of(
+    system: System,
+    values: Mapping[str, float] | None = None,
+    frequency: float = 1.0,
+    scale: float | None = None,
+    observed: Sequence[int] = (),
+) -> LinearPart:
+    """The linear part of a system with the fewest unknowns: condensed where forces leave degrees of freedom alone.
+
+    frequency: the highest circular frequency of interest, which decides how a large structure is projected; scale: one
+    within the range of interest; observed: degrees of freedom whose motion it should give as exactly.
+    """
+    at = system.parameters if values is None else values
+    directions = acting(system)
+    if len(directions) in (0, system.n):
+        return StructuralMatrices(system, at)
+    units = [np.eye(1, system.n, dof)[0] for dof in observed]
+    served = independent([*directions, *units])
+    reduction = Reduction(system, directions, served, tuple(observed), frequency / 16.0 if scale is None else scale)
+    return Condensed(reduction, reduction.covering(frequency, at), at)
+
+
+def acting(system: System) -> Array:
+    """Independent directions (m, n) that elements read and act along and loads act along, in the order met."""
+    n = system.n
+    rows = [d for e in system.elements for d in (*e.inputs(n), e.direction(n))]
+    rows += [c.direction for c in system.load_components()]
+    return independent(rows).reshape(-1, n)
+
+
+def independent(rows: Sequence[Array]) -> Array:
+    """Those of directions that do not depend on the ones before them."""
+    n = len(rows[0]) if rows else 0
+    kept: list[Array] = []
+    basis = np.zeros((0, n))
+    for row in rows:
+        row = np.asarray(row, dtype=float)
+        size = float(np.linalg.norm(row))
+        rest = row - (row @ basis.T) @ basis
+        rest -= (rest @ basis.T) @ basis
+        left = float(np.linalg.norm(rest))
+        if size > 0.0 and left > _DEPENDENT * size:
+            kept.append(row)
+            basis = np.concatenate((basis, rest[None] / left))
+            if len(kept) == n:
+                break
+    return np.array(kept)
+
+
+def coordinates_among(directions: Array, direction: Array) -> Array:
+    """c with `direction = c @ directions`; InputError if it is not among them."""
+    square, pulled = directions @ directions.T, directions @ direction
+    c = np.asarray(np.linalg.solve(square, pulled), dtype=float)
+    c[np.abs(c) <= 1e-14 * np.abs(c).max(initial=0.0)] = 0.0
+    if np.linalg.norm(direction - c @ directions) > 10.0 * _DEPENDENT * np.linalg.norm(direction):
+        raise InputError("this direction is not among those that elements and loads act along")
+    return c

@@ -1,0 +1,217 @@
+"""A large linear structure as seen from a few directions: its Galerkin projection onto a basis that is grown for them.
+
+Forces act and displacements are read along m directions, the rows of D. The projection onto the columns of V,
+
+    V^T M V y'' + V^T C V y' + V^T K V y = V^T D^T s,    q = D V y,
+
+has the structure's dynamic flexibility `G = D Z^-1 D^T`, `Z = K - Omega^2 M + i Omega C`, up to some frequency once V
+holds what the structure answers there. V grows by what is left over: with `R = D^T - Z V y`, the residual at some
+frequencies, the columns of `(K + s^2 M)^-1 R` are added, s > 0 a fixed frequency. For Rayleigh damping that is the
+block-Krylov basis which matches moments at `i s` (Bai, Applied Numerical Mathematics 43 (2002) 9-44), and any other
+damping, or other values of parameters in the matrices, find what they need in the same way. One factorisation serves
+all of it; the shift makes it one of a definite matrix for free bodies too. In exact arithmetic the error of G is
+`R^T Z^-1 R`, of second order in the residual where the matrices are symmetric, and is estimated by
+`R^T (K + s^2 M)^-1 R`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.linalg import eigh
+
+from suboctave.errors import InputError
+from suboctave.harmonic.basis import Array, ComplexArray
+from suboctave.interruption import check_time
+from suboctave.model.matrices import MatrixCoefficient
+from suboctave.model.system import System
+
+#: degrees of freedom up to which a structure is taken as it is
+COMPLETE = 40
+#: error of the flexibility, relative, that a basis is grown for
+_TOLERANCE = 1e-11
+#: frequencies at which a basis is tested, as shares of the highest, and at how many of them it is grown at once
+_TESTED, _AT_ONCE = tuple(np.linspace(1.0, 0.0, 17)[:-1].tolist()), 2
+#: part of the residual, relative to the largest, that is worth a vector
+_WORTH = 1e-6
+#: error below which a basis converges, and steps without progress after which rounding is taken to be all that is left
+_PROMISING, _PATIENCE = 1e-3, 4
+#: most vectors of a basis
+_MOST = 600
+#: relative change of an expression in a matrix that a basis is trusted over without a test
+_TRUSTED = 0.05
+
+
+class Projected(NamedTuple):
+    """A structure's matrices in a basis.
+
+    matrices
+        M, C, K, (r, r).
+    shapes
+        The basis V, (n, r); None for the structure's own degrees of freedom.
+    seen
+        The directions in it, D V, (m, r).
+    covers
+        Highest frequency it is made for.
+    error
+        Of the flexibility at the highest frequency, relative, against a direct solution of the whole structure; 0 for
+        the structure itself.
+    """
+
+    matrices: tuple[MatrixCoefficient, MatrixCoefficient, MatrixCoefficient]
+    shapes: Array | None
+    seen: Array
+    covers: float
+    error: float
+
+
+class Reduction:
+    """Grows the basis of a structure for the directions (m, n) that forces act along.
+
+    served: these and others that the motion is read along, (k, n), such as those of the degrees of freedom `observed`;
+    scale: a frequency within the range of interest.
+    """
+
+    def __init__(
+        self, system: System, directions: Array, served: Array, observed: tuple[int, ...], scale: float
+    ) -> None:
+        self.system = system
+        self.directions = directions
+        self.served = served
+        self.observed = observed
+        self.scale = scale
+        self._matrices = system.mass, system.damping, system.stiffness
+        self._shapes = np.zeros((system.n, 0))
+        self._solve: Any = None
+        #: expressions in the matrices and the highest frequency, where the basis was tested
+        self._tested: list[tuple[Array, float]] = []
+        self._projected: Projected | None = None
+
+    def covering(self, frequency: float, values: Mapping[str, float]) -> Projected:
+        """The structure in a basis that serves up to a frequency at these values of the parameters."""
+        if self.system.n <= COMPLETE:
+            if self._projected is None:
+                self._projected = Projected(self._matrices, None, self.directions, math.inf, 0.0)
+            return self._projected
+        at = np.array([c.value(values) for matrix in self._matrices for c in matrix.coefficients])
+        near = [
+            covers
+            for tested, covers in self._tested
+            if np.all(np.abs(at - tested) <= _TRUSTED * np.abs(tested)) and covers >= frequency
+        ]
+        if near and self._projected is not None:
+            return self._projected
+        self._grown(frequency, values)
+        self._tested.append((at, frequency))
+        self._projected = self._project(values)
+        return self._projected
+
+    # ---------------------------------------------------------------------------------------------------- the basis
+    def _grown(self, top: float, values: Mapping[str, float]) -> None:
+        """Grow the basis until it serves."""
+        matrices = [matrix.sparse_value(values) for matrix in self._matrices]
+        if self._solve is None:
+            self._solve = factorised(matrices[2] + self.scale**2 * matrices[0])
+        images = [matrix @ self._shapes for matrix in matrices]
+        columns = self.served.T
+        if not self._shapes.shape[1]:
+            self._add(self._solve(columns), matrices, images)
+        best, since = math.inf, 0
+        order = list(range(len(_TESTED)))
+        while True:
+            check_time()
+            small = [self._shapes.T @ image for image in images]
+            worst, left = 0.0, []
+            for i in order.copy():
+                error, answers = self._left_over(_TESTED[i] * top, small, images)
+                if error > worst:
+                    # the next basis is tested there first
+                    worst = error
+                    order.remove(i)
+                    order.insert(0, i)
+                left.append(answers)
+                if worst > _TOLERANCE and len(left) >= _AT_ONCE:
+                    break
+            best, since = (worst, 0) if worst < 0.5 * best or worst > _PROMISING else (best, since + 1)
+            if worst <= _TOLERANCE or since >= _PATIENCE or self._shapes.shape[1] >= min(_MOST, self.system.n):
+                return
+            self._add(np.concatenate(left, axis=1), matrices, images)
+
+    def _left_over(self, frequency: float, small: list[Array], images: list[Array]) -> tuple[float, Array]:
+        """The estimated error of the flexibility at a frequency, relative, and what a better basis needs, (n, 2 m).
+
+        small, images: M, C, K in the basis, (r, r), and of the basis, (n, r).
+        """
+        columns, factors = self.served.T, (-(frequency**2), 1j * frequency, 1.0)
+        y = np.linalg.solve(sum(f * z for f, z in zip(factors, small, strict=True)), self._shapes.T @ columns)
+        rest = columns - sum(f * (image @ y) for f, image in zip(factors, images, strict=True))
+        answers = self._solve(np.concatenate((rest.real, rest.imag), axis=1))
+        m = len(self.served)
+        size = np.abs((self.served @ (self._shapes @ y)).diagonal())
+        wrong = np.abs(rest.T @ (answers[:, :m] + 1j * answers[:, m:])) / np.sqrt(np.multiply.outer(size, size))
+        return float(wrong.max()), answers / np.sqrt(np.tile(size, 2))
+
+    def _add(self, candidates: Array, matrices: list[Any], images: list[Array]) -> None:
+        """Add the span of candidates, orthonormal in the mass, without what is in the basis already."""
+        mass = matrices[0]
+        for _ in range(2):
+            candidates = candidates - self._shapes @ (images[0].T @ candidates)
+        square = candidates.T @ (mass @ candidates)
+        sizes, turn = np.linalg.eigh(0.5 * (square + square.T))
+        kept = sizes > _WORTH**2 * sizes[-1]
+        new = candidates @ (turn[:, kept] / np.sqrt(sizes[kept]))
+        for _ in range(2):
+            new = new - self._shapes @ (images[0].T @ new)
+            square = new.T @ (mass @ new)
+            new = np.linalg.solve(np.linalg.cholesky(0.5 * (square + square.T)), new.T).T
+        self._shapes = np.concatenate((self._shapes, new), axis=1)
+        for i, matrix in enumerate(matrices):
+            images[i] = np.concatenate((images[i], matrix @ new), axis=1)
+
+    def _project(self, values: Mapping[str, float]) -> Projected:
+        """All matrices in the basis, turned to its modes at these values."""
+        mass, _, stiffness = (self._shapes.T @ (m.sparse_value(values) @ self._shapes) for m in self._matrices)
+        _, modes = eigh(0.5 * (stiffness + stiffness.T), 0.5 * (mass + mass.T))
+        shapes = self._shapes @ modes
+        matrices = tuple(matrix.projected(shapes) for matrix in self._matrices)
+        assert len(matrices) == 3
+        top = max(covers for _, covers in self._tested)
+        seen = self.directions @ shapes
+        m, c, k = (matrix.value(values) for matrix in matrices)
+        exact = exact_flexibility(self.system, self.directions, top, values)
+        off = np.abs(seen @ np.linalg.solve(k - top**2 * m + 1j * top * c, seen.T) - exact)
+        size = np.sqrt(np.abs(exact.diagonal()))
+        return Projected(matrices, shapes, seen, top, float((off / np.multiply.outer(size, size)).max()))
+
+
+def factorised(matrix: Any) -> Any:
+    """The solver of a large sparse matrix; for symmetric patterns its pivots stay on the diagonal where they can."""
+    import scipy.sparse
+    from scipy.sparse.linalg import splu
+
+    try:
+        factors = splu(
+            scipy.sparse.csc_matrix(matrix),
+            permc_spec="MMD_AT_PLUS_A",
+            diag_pivot_thresh=0.01,
+            options={"SymmetricMode": True},
+        )
+    except RuntimeError as failure:
+        raise InputError(f"the stiffness cannot be factorised ({failure}): is a part of the structure empty?") from None
+
+    def solve(columns: Array) -> Array:
+        result: Array = factors.solve(np.ascontiguousarray(columns))
+        return result
+
+    return solve
+
+
+def exact_flexibility(system: System, directions: Array, frequency: float, values: Mapping[str, float]) -> ComplexArray:
+    """The dynamic flexibility between directions (m, n) by a direct solution of the whole structure, (m, m)."""
+    mass, damping, stiffness = (m.sparse_value(values) for m in (system.mass, system.damping, system.stiffness))
+    columns = factorised(stiffness - frequency**2 * mass + 1j * frequency * damping)(directions.T.astype(complex))
+    result: ComplexArray = directions @ columns
+    return result
