@@ -34,14 +34,21 @@ square of the gap, so that the shift is at most about `sqrt(2 g |D|)`.
 from __future__ import annotations
 
 import math
-from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg
-from scipy.linalg import eigh, lapack
+from scipy.linalg import lapack
 
-from suboctave.floquet.propagate import multipliers_and_shifts, parts_needed, propagate, response, structure
+from suboctave.floquet.blocks import in_blocks
+from suboctave.floquet.propagate import (
+    ACCURACY,
+    march,
+    multipliers_and_shifts,
+    parts_needed,
+    periodic_start,
+    response,
+    structure,
+)
 from suboctave.floquet.result import FloquetResult
 from suboctave.floquet.time_mesh import (
     NODES,
@@ -53,18 +60,19 @@ from suboctave.floquet.time_mesh import (
     panels_between,
     split,
 )
-from suboctave.harmonic.aft.channel import Channel, Group
+from suboctave.harmonic.aft.channel import Channel
 from suboctave.harmonic.aft.closed_form import NO_ROWS
 from suboctave.harmonic.aft.general import GeneralLaw, Smoothness
 from suboctave.harmonic.aft.table import PackedLaws, Probe
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.evaluation import BalanceState
-from suboctave.harmonic.linear_part import LinearPart
 from suboctave.harmonic.quadrature import search_grid, singular_instants
 from suboctave.interruption import check_time
 
-#: longest panel in units of the fastest time scale: there collocation is exact to rounding
-_LONGEST = 0.8
+#: how far blocks without states may move multipliers, and how much further where a force is left unbalanced altogether,
+#: which does more; longest panels in units of the time scales of the forces, of the blocks as channels see them, and of
+#: the blocks; how much less these count if they are seen little, as a power: with them multipliers are good for 1e-8
+_LIMITS = (1e-4, 1e-2, 1.2, 1.8, 24.0, 1.0 / 12.0)
 #: most panels that a period is cut into for that
 _MOST = 20000
 #: nodes per period of a law of unknown smoothness, in units of panels of one radian; phase of a tangent over a panel
@@ -75,7 +83,7 @@ _SLICE = 1e-9
 _ROUGH = 1e-6
 _NO_PASSAGES = np.zeros((2, 0))
 _NOTHING = Probe()
-_NO_START, _NO_NODES = np.empty((0, 1)), np.empty((0, 0, 0))
+_NO_MULTIPLIERS = np.empty(0, dtype=complex), np.empty(0)
 
 
 class _Linearised:
@@ -92,8 +100,8 @@ class _Linearised:
         See `time_mesh.along_panels`, with the elements that are not known in closed form.
     active
         The channels with a force, (A,).
-    varying
-        Whether any stiffness or damping varies within panels.
+    coupled
+        Whether any channel has stiffness or damping.
     before
         Monodromy matrix along the motion as it stands, (2 n, 2 n).
     """
@@ -102,16 +110,14 @@ class _Linearised:
         balance = state.balance
         self.state = state
         own = self._own = Channels(state)
-        self._modes = modes = _in_modes(state.linear, balance.all_groups)
-        self.size = 2 * len(modes.stiffness)
+        self._blocks = blocks = in_blocks(state.linear, balance.all_groups)
         self._laws = laws = PackedLaws(state.laws.groups, own.probes) if own.probes else state.packed
-        self._motions, self._forces, self.active = state.motions, state.force_spectra, modes.active
+        self._motions, self._forces, self.active = state.motions, state.force_spectra, blocks.active
         if own.probes:
             self._motions = np.concatenate((state.motions, own.motions))
             self._forces = np.concatenate((state.force_spectra[: own.first], own.forces))
-            self.active = np.concatenate((np.arange(own.first), own.numbers))[modes.active]
+            self.active = np.concatenate((np.arange(own.first), own.numbers))[blocks.active]
         degree = max(own.degree, laws.degree)
-        self.varying = degree > 0
         longest = min(longest_panel(self._motions, degree), own.finest)
         if laws.unknown_samples:
             longest = min(longest, _BLIND / laws.unknown_samples)
@@ -122,6 +128,9 @@ class _Linearised:
             for g, points, widths in laws.singularities
         ]
         passages = np.concatenate(passed, axis=1) if passed else _NO_PASSAGES
+        self._most, self._held = np.zeros((2, len(self.active))), np.empty((2, len(self.active)))
+        for g, piece in zip(laws.owner.tolist(), laws.pieces[:, 0].tolist(), strict=True):
+            self._most[0, self.active == g] += abs(piece)
         events = events_along(self._motions, laws.pieces, laws.owner, passages, grid.zr, grid.zi)
         self.events = events[np.argsort(events[:, 0], kind="stable")]
         panels, start = panels_between(self.events, longest)
@@ -129,13 +138,23 @@ class _Linearised:
         while len(panels) < total <= _MOST:
             panels, start = split(panels, start, parts)
             parts, total = self._evaluated(panels)
-        self.start = start
+        self.start, self.coupled = start, bool(self._held.any())
         own.locate(self.events, start, laws.owner, len(panels))
-        self._structures = structure(self.spans, modes.stiffness, modes.damping, modes.left, modes.right)
-        start = np.empty((self.size, 1))
-        self._nodes = np.empty((len(self.spans), 2 * len(self.active) * ORDER, self.size + 1))
-        self.before = self._propagated(self.law, np.zeros(self.base.shape), start, self._nodes)
-        self._start = start[:, 0] if len(self._nodes) and len(self.active) else None
+        dynamic = self._dynamic
+        self.size = size = int(blocks.first[dynamic])
+        self._structures = structure(
+            self.spans, blocks.motion, blocks.first, blocks.driven, blocks.read, blocks.coupling, blocks.flexible,
+            dynamic,
+        )  # fmt: skip
+        whole, channels = _identity(size, size + 1), len(self.active)
+        self._acting = np.empty((len(self.spans), channels), dtype=bool)
+        self._solved = np.empty((len(self.spans), channels * ORDER, size + 1))
+        self._march(self.law, np.zeros(self.base.shape), whole)
+        self.before = np.ascontiguousarray(whole[:, :size])
+        self._start = None
+        if size and len(self.active):
+            self._start = np.empty((size, 1))
+            periodic_start(whole, self._start)
 
     def _evaluated(self, panels: Array) -> tuple[np.ndarray, float]:
         """Evaluate all laws on panels; how many parts each of these needs, (P,), and how many panels that makes."""
@@ -150,15 +169,20 @@ class _Linearised:
         self._own.evaluate(self.path, self.law)
         parts: np.ndarray
         total: float
-        parts, total = parts_needed(self.spans, self.law, self.base, self.active, *self._modes.rates, _LONGEST)
+        blocks, resolved = self._blocks, (self.state.basis.harmonics + 0.5) * self.state.rate
+        parts, total, self._dynamic, self.neglected = parts_needed(
+            self.spans, self._forces, self.law, self.base, self.active, self._most, self._held, blocks.rates,
+            blocks.decays, blocks.flexibility, blocks.share, blocks.first, blocks.coupled, resolved, _LIMITS,
+        )  # fmt: skip
         return parts, total
 
-    def _propagated(self, law: Array, kick: Array, start: Array, nodes: Array) -> Array:
-        """The monodromy matrix; see `propagate`."""
-        modes, (kinds, structures) = self._modes, self._structures
-        out = np.empty((self.size, self.size))
-        propagate(kinds, structures, law, self.base, kick, self.active, modes.left, modes.right, out, start, nodes)
-        return out
+    def _march(self, law: Array, kick: Array, total: Array) -> None:
+        """See `propagate.march`."""
+        blocks = self._blocks
+        march(
+            self._structures, blocks.first, blocks.driven, law, self.base, kick, self.active, total, self._acting,
+            self._solved,
+        )  # fmt: skip
 
     def _changed(self, change: Array) -> tuple[Array, Array]:
         """Along the motion changed by (G, 2, N): no force, stiffness and damping (G, 3, N), kicks at the beginnings of
@@ -173,6 +197,22 @@ class _Linearised:
         self._own.changed(self.path, change, law, self.spans)
         return law, kick
 
+    def fast(self) -> tuple[ComplexArray, Array]:
+        """Multipliers of the blocks without states, as if no channel acted, and how far those may move them."""
+        blocks, dynamic = self._blocks, self._dynamic
+        if self.size == len(blocks.exponents):
+            return _NO_MULTIPLIERS
+        time = 2.0 * math.pi / self.state.rate
+        exponents = blocks.exponents[self.size :] * time
+        mu = np.exp(exponents)
+        moved = 1e-15 * np.abs(exponents)
+        if blocks.coupled > dynamic:
+            flexible, rates = np.abs(blocks.flexibility[dynamic:]).sum(axis=2), blocks.rates[dynamic:]
+            by_stiffness, by_damping = (flexible @ held for held in self._held)
+            by_forces = rates * (by_stiffness + rates * by_damping)
+            moved += np.repeat(np.expm1(np.minimum(2.0 * by_forces, 1.0)), np.diff(blocks.first[dynamic:]))
+        return mu, np.abs(mu) * moved + 1e-14
+
     def multipliers(self, weight: float) -> tuple[ComplexArray, Array, float]:
         """Multipliers, how far the correction has moved them, and the share of it that was taken.
 
@@ -183,65 +223,24 @@ class _Linearised:
         if start is not None:
             if weight < 1.0:
                 start = start - (1.0 - weight) * (projector(self.before) @ start)
-            share = response(start, self._nodes, self.active, self.path, _LARGEST, change)
-        after = self._propagated(*self._changed(change), _NO_START, _NO_NODES)
+            share = response(
+                self._structures, self._blocks.first, self.active, self._acting, self._solved, start, self.path,
+                _LARGEST, change,
+            )  # fmt: skip
+        after = _identity(self.size, self.size)
+        law, kick = self._changed(change)
+        self._march(law, kick, after)
         mu, shift = np.empty(self.size, dtype=complex), np.empty(self.size)
         real, imaginary, left, right, _ = lapack.dgeev(after, 1, 1)
         multipliers_and_shifts(real, imaginary, left, right, after, self.before, mu, shift)
         return mu, shift, share
 
 
-class _Modes(NamedTuple):
-    """The linear part in its modes, normalised by mass: norms have no units, and most products are with diagonal
-    matrices. Where mass or stiffness is not symmetric, or the mass not positive definite, in DOFs weighted by the
-    square roots of their masses.
-
-    stiffness, damping
-        K, C, (n, n).
-    left, right
-        Where the active channels act and what they read, (A, n).
-    active
-        Which of all groups' inputs they are, (A,).
-    rates
-        What bounds the rates of the motion: the norms of K and C, and what a channel's stiffness or damping of one adds
-        to them, (A,).
-    """
-
-    stiffness: Array
-    damping: Array
-    left: Array
-    right: Array
-    active: np.ndarray
-    rates: tuple[float, float, Array]
-
-
-@lru_cache(maxsize=16)
-def _in_modes(linear: LinearPart, groups: tuple[Group, ...]) -> _Modes:
-    m, c, k = (np.asarray(matrix, dtype=float) for matrix in linear.equation_of_motion())
-    # in one unknown DOF channels have one direction
-    pairs = [(d if len(d) == 1 else group.direction, d) for group in groups for d in group.inputs]
-    rows = np.array([[linear.expand(d) for d in pair] for pair in pairs], dtype=float).reshape(-1, 2, len(m))
-    active = np.flatnonzero(rows[:, 0].any(axis=1))
-    l, r = rows[active, 0], rows[active, 1]
-    modes = None
-    if np.array_equal(m, m.T) and np.array_equal(k, k.T):
-        try:
-            values, modes = eigh(k, m)
-        except np.linalg.LinAlgError:
-            modes = None
-    if modes is not None:
-        l, r, k, c = l @ modes, r @ modes, np.diag(values), modes.T @ c @ modes
-        # without what rounding leaves off the diagonal
-        scale = np.sqrt(np.abs(np.multiply.outer(c.diagonal(), c.diagonal())))
-        c = np.where(np.abs(c) > 1e-13 * scale, c, 0.0)
-    else:
-        weight = np.sqrt(m.diagonal())
-        inverse = np.linalg.inv(m) * weight[:, None]
-        l, r, k, c = l @ inverse.T, r / weight, inverse @ k / weight, inverse @ c / weight
-    k, c, l, r = (np.ascontiguousarray(matrix) for matrix in (k, c, l, r))
-    shares = np.abs(l).max(axis=1, initial=0.0) * np.abs(r).sum(axis=1)
-    rates = float(np.linalg.norm(k, np.inf)), float(np.linalg.norm(c, np.inf)), shares
-    return _Modes(k, c, l, r, active, rates)
+def _identity(rows: int, columns: int) -> Array:
+    """Ones on the diagonal: a few times quicker than `np.eye`."""
+    out = np.zeros((rows, columns))
+    out.ravel()[: rows * columns : columns + 1] = 1.0
+    return out
 
 
 class Channels:
@@ -302,7 +301,7 @@ class Channels:
         begin = len(self.motions)
         for i, (d, motion) in enumerate(zip(own.ins, along.motions, strict=True)):
             if len(d) == 1:
-                # see `_in_modes`
+                # see `blocks.in_blocks`
                 scale[i] = own.out[0] / d[0]
             self.numbers.append(self._channel(motion, _probe(law, law.points if i == 0 else (), motion)))
             if i == 0 and law.points:
@@ -430,8 +429,6 @@ def _probe(law: Smoothness, levels: tuple[float, ...], motion: ComplexArray) -> 
 
 #: a correction larger than this share of the motion is cut down to it
 _LARGEST = 0.1
-#: least error where stiffness or damping varies: what the panels are made for
-_PANELS = 1e-8
 #: shift of a multiplier in units of its distance to +1 that leaves doubt whether the first order tells it
 _DOUBTFUL = 0.1
 #: distance to +1 up to which multipliers lie together with the nearest one, in units of its own
@@ -444,8 +441,20 @@ def floquet_multipliers(state: BalanceState) -> FloquetResult:
     """Multipliers, error estimates and verdict of a solved motion, over the motion's own period (`nu` load periods)."""
     check_time()
     motion = _Linearised(state)
+    mu, errors = motion.fast()
     if not np.isfinite(motion.before).all():
-        return _no_numbers(state, motion.size)
+        return _no_numbers(state, motion.size + len(mu))
+    if motion.size:
+        with_states = _with_states(motion)
+        mu, errors = np.concatenate((with_states[0], mu)), np.concatenate((with_states[1], errors))
+        if len(mu) > motion.size:
+            order = np.argsort(-np.abs(mu), kind="stable")
+            mu, errors = mu[order], errors[order]
+    return FloquetResult(mu, errors)
+
+
+def _with_states(motion: _Linearised) -> tuple[ComplexArray, Array]:
+    """Multipliers and errors of the blocks that have states."""
     mu, shift, share = motion.multipliers(1.0)
     # there are few: numbers are quicker than arrays
     values, shifts = mu.tolist(), shift.tolist()
@@ -458,8 +467,8 @@ def floquet_multipliers(state: BalanceState) -> FloquetResult:
         mu, shift, share = _beside_fold(motion, moved, shift)
     # where the correction had to be cut, the motion is not near enough to a true one to say much
     cut = 1.0 / share - 1.0 if share > 0.0 else math.inf
-    least = (_PANELS if motion.varying else 0.0) + cut
-    return FloquetResult(mu, shift * (1.0 + cut) + least * largest)
+    least = (ACCURACY if motion.coupled else 0.0) + motion.neglected + cut
+    return mu, shift * (1.0 + cut) + least * largest
 
 
 def _no_numbers(state: BalanceState, count: int) -> FloquetResult:

@@ -50,20 +50,19 @@ def _integration() -> Array:
     return np.linalg.solve(powers.T, integrals.T).T.copy()
 
 
-def _lower() -> Array:
-    """From values at the nodes to those of their polynomial without its two highest Legendre components, transposed."""
+def _highest() -> Array:
+    """Of the two highest Legendre components of a polynomial, from its values at the nodes to its share of each, and
+    their values at the nodes, (2, 2, ORDER).
+    """
     legendre = np.polynomial.legendre.legvander(NODES, ORDER - 1)
-    kept = np.diag((np.arange(ORDER) < ORDER - 2).astype(float))
-    return np.ascontiguousarray((legendre @ kept @ np.linalg.inv(legendre)).T)
+    return np.ascontiguousarray(np.stack((np.linalg.inv(legendre)[-2:], legendre.T[-2:]), axis=1))
 
 
 NODES = _lobatto()
 INTEGRATION = _integration()
 #: a panel's quadrature weights
 WEIGHTS = INTEGRATION[-1].copy()
-#: the adjoint of the integration by parts: with both, areas in phase space are kept
-ADJOINT = WEIGHTS * (1.0 - INTEGRATION.T / WEIGHTS[:, None])
-LOWER = _lower()
+HIGHEST = _highest()
 
 
 @kernel()
