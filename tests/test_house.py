@@ -20,6 +20,7 @@ SOURCE = Path(suboctave.__file__).parent
 # Data flows one way: a room imports from rooms before it in this list, and from itself.
 ROOMS = [
     "model",
+    "structures",
     "timedomain",
     "harmonic",
     "continuation",

@@ -93,6 +93,13 @@ from .pictures import (
     write_report as write_report,
 )
 from .results import BifurcationDiagram as BifurcationDiagram, Branch as Branch
+from .structures import (
+    DofMap as DofMap,
+    Mesh as Mesh,
+    ModalDamping as ModalDamping,
+    Rayleigh as Rayleigh,
+    Structure as Structure,
+)
 from .study.results import Results as Results, load as load
 from .verification import stability as stability, verify as verify
 from .version import __version__ as __version__

@@ -1,0 +1,6 @@
+"""Finite-element models as their users have them: matrices with labelled degrees of freedom, from files or meshes."""
+
+from suboctave.structures.damping import ModalDamping as ModalDamping, Rayleigh as Rayleigh
+from suboctave.structures.dof_map import DofMap as DofMap
+from suboctave.structures.mesh import Mesh as Mesh
+from suboctave.structures.structure import Structure as Structure

@@ -1,0 +1,117 @@
+"""Viscous damping made of mass and stiffness: Rayleigh's, `C = alpha M + beta K`, and modal,
+
+    C = M Phi diag(2 zeta omega) Phi^T M,        Phi^T M Phi = I.
+
+Rayleigh's damps a mode of the circular frequency omega with the ratio `alpha / (2 omega) + beta omega / 2`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from suboctave.errors import InputError, is_number, shortened
+from suboctave.model.expressions.coefficients import Coefficient, Number, named_coefficient
+from suboctave.structures.frequencies import natural_frequencies
+
+#: DOFs up to which a full matrix of modal damping is made: 32 MB of it
+MOST_MODAL = 2000
+
+
+@dataclass(frozen=True)
+class Rayleigh:
+    """Damping `alpha M + beta K`. Numbers, or expressions in the parameters of the system.
+
+    alpha
+        Unit 1 / time: damps low frequencies.
+    beta
+        Unit time: damps high frequencies.
+    """
+
+    alpha: Number = 0.0
+    beta: Number = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("alpha", "beta"):
+            self._read(name)
+
+    def _read(self, name: str) -> Coefficient:
+        return named_coefficient(getattr(self, name), "Rayleigh", name)
+
+    @classmethod
+    def from_ratios(cls, first: tuple[float, float], second: tuple[float, float]) -> Rayleigh:
+        """The damping with given ratios at two circular frequencies: `(omega1, zeta1), (omega2, zeta2)`.
+
+        Between them modes are damped less, beyond them more. Raises `InputError` for frequencies that are the same.
+        """
+        for pair in (first, second):
+            is_pair = isinstance(pair, Sequence) and len(pair) == 2 and all(map(is_number, pair))
+            if not is_pair or not pair[0] > 0 or pair[1] < 0:
+                what = "a pair of a circular frequency above 0 and a damping ratio from 0 on"
+                raise InputError(f"Rayleigh.from_ratios takes twice {what}, not {shortened(pair)}")
+        (w1, z1), (w2, z2) = first, second
+        if w1 == w2:
+            raise InputError(f"Rayleigh.from_ratios needs two different frequencies, not twice {w1:g}")
+        spread = (w2 - w1) * (w2 + w1)
+        return cls(2 * w1 * w2 * (z1 * w2 - z2 * w1) / spread, 2 * (z2 * w2 - z1 * w1) / spread)
+
+    @property
+    def constant(self) -> bool:
+        """Whether both are numbers."""
+        return self._read("alpha").constant and self._read("beta").constant
+
+    def matrix(self, mass: Any, stiffness: Any) -> Any:
+        """The damping matrix (n, n), sparse; `{expression: matrix}` where there are parameters in it."""
+        alpha, beta = self._read("alpha"), self._read("beta")
+        if self.constant:
+            return alpha.value({}) * mass + beta.value({}) * stiffness
+        if alpha == beta:
+            return {alpha.text: mass + stiffness}
+        return {alpha.text: mass, beta.text: stiffness}
+
+
+@dataclass(frozen=True)
+class ModalDamping:
+    """Damping ratios of the modes, the lowest first; modes beyond those are undamped.
+
+    ratios
+        One number for `count` modes (all modes where none is given), or one number for each of the first modes.
+        Rigid-body modes count, and stay undamped.
+
+    The matrix is full: structures of more than 2000 degrees of freedom are refused, take `Rayleigh` there.
+    """
+
+    ratios: float | Sequence[float]
+    count: int | None = None
+
+    def __post_init__(self) -> None:
+        several = isinstance(self.ratios, Sequence | np.ndarray) and not isinstance(self.ratios, str)
+        if several:
+            object.__setattr__(self, "ratios", tuple(self.ratios))  # type: ignore[arg-type]
+        given = self.ratios if isinstance(self.ratios, tuple) else (self.ratios,)
+        if not given or not all(is_number(ratio) and ratio >= 0 for ratio in given):
+            raise InputError(f"damping ratios are numbers from 0 on, not {shortened(self.ratios)}")
+        if self.count is not None and (several or isinstance(self.count, bool) or self.count < 1):
+            raise InputError("count= is for one ratio of several modes, and at least 1")
+
+    def matrix(self, mass: Any, stiffness: Any) -> Any:
+        """The damping matrix (n, n), in compressed-row form."""
+        import scipy.sparse
+
+        n = mass.shape[0]
+        if n > MOST_MODAL:
+            raise InputError(
+                f"modal damping makes a full matrix, of {n} DOFs here; up to {MOST_MODAL} are taken. Use "
+                "Rayleigh.from_ratios((omega1, zeta1), (omega2, zeta2)) in its place"
+            )
+        ratios = np.array(self.ratios if isinstance(self.ratios, tuple) else [self.ratios] * min(self.count or n, n))
+        if len(ratios) > n:
+            raise InputError(f"{len(ratios)} damping ratios are given, the structure has {n} modes")
+        found = natural_frequencies(mass, stiffness, len(ratios))
+        omega = np.where(np.arange(len(found)) < found.growing + found.rigid, 0.0, found.omega)
+        momenta = mass @ found.modes
+        full = (momenta * (2.0 * ratios[: len(omega)] * omega)) @ momenta.T
+        return scipy.sparse.csr_array(0.5 * (full + full.T))

@@ -1,0 +1,179 @@
+"""A finite-element model: mass, stiffness and damping with labelled degrees of freedom, `M x'' + C x' + K x = p(t)`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from numbers import Integral
+from typing import Any
+
+import numpy as np
+
+from suboctave.errors import InputError, located, shortened
+from suboctave.model.elements.base import Array, BaseElement
+from suboctave.model.loads import Load
+from suboctave.model.system import System
+from suboctave.structures.checks import inertia_checked, square_matrix, symmetric_matrix
+from suboctave.structures.damping import ModalDamping, Rayleigh
+from suboctave.structures.dof_map import DofMap, shown_dofs, weighted
+from suboctave.structures.frequencies import NaturalFrequencies, natural_frequencies
+from suboctave.structures.mesh import Mesh
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Structure:
+    """Matrices of a structure with what its degrees of freedom are called. Immutable.
+
+    mass, stiffness
+        Symmetric (n, n), sparse or dense, finite; kept in SciPy's compressed-row form. DOFs without inertia are kept
+        (`massless`), and have to be fixed before the structure vibrates.
+    damping
+        A matrix (n, n), or `Rayleigh`, or `ModalDamping`; none by default.
+    dofs
+        A `DofMap`, or n pairs (node, direction); without one, degrees of freedom are numbers from 0.
+    mesh
+        For pictures.
+
+    Units are the user's own, if they are consistent (N, mm, t, s; or N, m, kg, s): `frequencies` shows whether they
+    are. Raises `InputError` for matrices that are no such, of other sizes, asymmetric, and for maps of another length.
+    """
+
+    mass: Any
+    stiffness: Any
+    damping: Any = None
+    dofs: DofMap | None = None
+    mesh: Mesh | None = None
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        labels: Any = self.dofs
+        if labels is not None and not isinstance(labels, DofMap):
+            with located("dofs"):
+                labels = DofMap(labels)
+        mass = square_matrix(self.mass, "mass")
+        n = mass.shape[0]
+        if labels is not None and len(labels) != n:
+            raise InputError(f"the DOF map has {len(labels)} labels, the matrices {n} DOFs", ("dofs",))
+        damping = self.damping
+        if not isinstance(damping, Rayleigh | ModalDamping | None):
+            damping = square_matrix(damping, "damping", n)
+        if self.mesh is not None and not isinstance(self.mesh, Mesh):
+            raise InputError(f"mesh must be a Mesh, not {shortened(self.mesh)}", ("mesh",))
+        stiffness = symmetric_matrix(square_matrix(self.stiffness, "stiffness", n), "stiffness", labels)
+        mass = inertia_checked(symmetric_matrix(mass, "mass", labels), labels)
+        read = {"mass": mass, "stiffness": stiffness, "damping": damping, "dofs": labels, "name": str(self.name)}
+        for field, value in read.items():
+            object.__setattr__(self, field, value)
+
+    # ---------------------------------------------------------------------------------------------------------- places
+    @property
+    def n(self) -> int:
+        """How many degrees of freedom there are."""
+        return int(self.mass.shape[0])
+
+    @property
+    def massless(self) -> tuple[int, ...]:
+        """The degrees of freedom without inertia: rotations of solid elements, multipliers of constraints."""
+        return tuple(np.flatnonzero(self.mass.diagonal() == 0.0).tolist())
+
+    def dof(self, node: Any, direction: Any = None) -> int:
+        """The number, from 0, of the degree of freedom of a node in a direction: an element's `dof`.
+
+        `node`: 1042, "1042", "node 1042"; or a text of both, "1042 z". `direction`: x, y, z, rx, ry, rz in any case, or
+        a number from 1 to 6. Raises `InputError` with what there is near it, and for fixed degrees of freedom.
+        """
+        return self._labels().index(node, direction)
+
+    def direction(self, weights: Mapping[Any, float]) -> Array:
+        """The vector (n,) of a weighted sum of displacements, `{(node, direction): weight}`, for `direction=`."""
+        return weighted(self._labels(), weights)
+
+    def _labels(self) -> DofMap:
+        if self.dofs is None:
+            raise InputError(
+                f"this structure has no DOF map: its DOFs are the numbers 0 to {self.n - 1}; give dofs= to name them"
+            )
+        return self.dofs
+
+    def fixed(self, dofs: Iterable[Any]) -> Structure:
+        """The structure with some degrees of freedom held: their rows and columns go.
+
+        `dofs`: numbers from 0, pairs (node, direction), or texts like "1042 z". Raises `InputError` for what is none.
+        """
+        if isinstance(dofs, str | Integral) or not isinstance(dofs, Iterable):
+            raise InputError(f"fixed takes a list of DOFs, not {shortened(dofs)}")
+        gone = sorted({self._place(item) for item in dofs})
+        kept = np.setdiff1d(np.arange(self.n), gone)
+        if not len(kept):
+            raise InputError("all DOFs would be fixed: nothing is left that moves")
+        cut = {what: getattr(self, what)[kept][:, kept] for what in ("mass", "stiffness")}
+        if not isinstance(self.damping, Rayleigh | ModalDamping | None):
+            cut["damping"] = self.damping[kept][:, kept]
+        return replace(self, **cut, dofs=None if self.dofs is None else self.dofs.without(gone))
+
+    def _place(self, item: Any) -> int:
+        if isinstance(item, Integral) and item is not True and item is not False:
+            place = int(item)
+            if not 0 <= place < self.n:
+                raise InputError(f"there is no DOF {place}: they are numbered 0 to {self.n - 1}")
+            return place
+        if isinstance(item, Sequence) and not isinstance(item, str) and len(item) == 2:
+            return self.dof(*item)
+        return self.dof(item)
+
+    # --------------------------------------------------------------------------------------------------------- motion
+    def with_damping(self, damping: Any) -> Structure:
+        """The structure with another damping: a matrix (n, n), `Rayleigh`, `ModalDamping`, or None."""
+        return replace(self, damping=damping)
+
+    def frequencies(self, count: int = 10) -> NaturalFrequencies:
+        """The lowest `count` natural frequencies without damping, with their modes; rigid-body modes are counted.
+
+        Printed, they are a table in radians per unit time and in hertz: frequencies 10^1.5 or 10^3 off show units that
+        do not fit each other.
+        """
+        return natural_frequencies(self.mass, self.stiffness, count)
+
+    def system(
+        self,
+        elements: Iterable[BaseElement] = (),
+        loads: Iterable[Load] = (),
+        parameters: Mapping[str, float] | None = None,
+        damping: Any = None,
+        name: str = "",
+    ) -> System:
+        """The structure with nonlinear elements and loads at its degrees of freedom.
+
+        `damping`: in the place of its own, a matrix, `Rayleigh` (its numbers may be expressions in parameters) or
+        `ModalDamping`. The other arguments are those of `System`; names of DOFs are the labels, "1042 z".
+        """
+        if self.massless:
+            what = shown_dofs(self.massless, self.dofs)
+            raise InputError(
+                f"DOFs without inertia: {what}; every DOF of a system needs some. Hold those that do not matter with "
+                "structure.fixed([...]), or reduce the model where it was made"
+            )
+        chosen = self.damping if damping is None else damping
+        if isinstance(chosen, Rayleigh | ModalDamping):
+            chosen = chosen.matrix(self.mass, self.stiffness)
+        elif chosen is None:
+            chosen = 0.0 * self.mass
+        names = () if self.dofs is None else self.dofs.names
+        title = name or self.name
+        return System(self.mass, chosen, self.stiffness, elements, loads, parameters, title, names)
+
+    def __repr__(self) -> str:
+        title = f"Structure {self.name!r}" if self.name else "Structure"
+        lines = [f"{title}: {self.n} {'DOF' if self.n == 1 else 'DOFs'}"]
+        if self.dofs is not None:
+            lines[0] += f" ({', '.join(self.dofs.names[:4])}{', ...' * (self.n > 4)})"
+        lines.append(f"  nonzeros   mass {self.mass.nnz}, stiffness {self.stiffness.nnz}")
+        damping = self.damping
+        if damping is not None:
+            kept = isinstance(damping, Rayleigh | ModalDamping)
+            lines.append(f"  damping    {damping if kept else f'{damping.nnz} nonzeros'}")
+        if self.massless:
+            lines.append(f"  no inertia {shown_dofs(self.massless, self.dofs)}")
+        if self.mesh is not None:
+            lines.append(f"  mesh       {str(self.mesh).removeprefix('Mesh: ')}")
+        return "\n".join(lines)
