@@ -1,5 +1,6 @@
 """The public names and where they are defined; read by type checkers and, lazily, by `__init__.py`."""
 
+from . import structures as structures
 from .analysis.branches import (
     continue_branch as continue_branch,
     frequency_response as frequency_response,

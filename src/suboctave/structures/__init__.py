@@ -3,4 +3,10 @@
 from suboctave.structures.damping import ModalDamping as ModalDamping, Rayleigh as Rayleigh
 from suboctave.structures.dof_map import DofMap as DofMap
 from suboctave.structures.mesh import Mesh as Mesh
+from suboctave.structures.sources import (
+    beam as beam,
+    from_skfem as from_skfem,
+    join as join,
+    plate as plate,
+)
 from suboctave.structures.structure import Structure as Structure

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from suboctave.errors import InputError, shortened
+from suboctave.errors import InputError, is_number, shortened
 from suboctave.model.elements.base import Array
 from suboctave.structures.dof_map import Node, node_label
 
@@ -43,6 +43,13 @@ class Mesh:
         object.__setattr__(self, "points", read)
         object.__setattr__(self, "cells", _cells(cells, len(read)))
         object.__setattr__(self, "nodes", labels)
+
+    def nearest(self, *place: float) -> Node:
+        """The label of the node nearest to the point (x, y, z); what is left out is zero."""
+        if not 1 <= len(place) <= 3 or not all(map(is_number, place)):
+            raise InputError(f"nearest takes the coordinates x, y, z of a point, not {shortened(place)}")
+        at = np.pad(np.array(place, dtype=float), (0, 3 - len(place)))
+        return self.nodes[int(np.argmin(np.linalg.norm(self.points - at, axis=1)))]
 
     def __repr__(self) -> str:
         counts = ", ".join(f"{len(rows)} {kind}" for kind, rows in self.cells.items())
