@@ -29,6 +29,7 @@ SYSTEMS = [
     library.duffing(),
     library.nltva(),
     library.two_mass_unilateral(),
+    library.chain_with_stop(4),
 ]
 
 
@@ -83,6 +84,18 @@ def test_two_masses_have_the_frequencies_of_the_golden_ratio():
     np.testing.assert_array_equal(mass, np.eye(2))
     frequencies = np.sqrt(np.linalg.eigvalsh(stiffness))
     np.testing.assert_allclose(frequencies, [(math.sqrt(5) - 1) / 2, (math.sqrt(5) + 1) / 2], rtol=1e-14)
+
+
+@pytest.mark.parametrize("masses", [1, 2, 10])
+def test_the_chain_has_the_frequencies_of_the_closed_form(masses):
+    """Free at the far end: 2 sin((2 i - 1) pi / (4 N + 2))."""
+    system = library.chain_with_stop(masses, alpha=0.03, beta=0.2)
+    mass, damping, stiffness = system.matrices()
+    exact = 2.0 * np.sin((2.0 * np.arange(1, masses + 1) - 1.0) * np.pi / (4 * masses + 2))
+    np.testing.assert_allclose(np.sqrt(np.linalg.eigvalsh(stiffness)), exact, rtol=1e-12)
+    np.testing.assert_allclose(damping, 0.03 * mass + 0.2 * stiffness, atol=1e-15)
+    with pytest.raises(InputError, match=r"masses=2\.5"):
+        library.chain_with_stop(2.5)
 
 
 def test_every_argument_is_a_parameter():

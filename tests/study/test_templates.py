@@ -119,3 +119,15 @@ def test_matrices_come_from_files(tmp_path, suboctave):
         read_matrix(tmp_path / "b.npz", None)
     with pytest.raises(so.InputError, match="holds no 'k'"):
         read_matrix(tmp_path / "b.npz", "k")
+
+
+def test_published_structures_by_name(tmp_path, suboctave):
+    path = tmp_path / "beam.toml"
+    path.write_text(
+        '[system]\nlibrary = "cantilever_beam"\narguments = {elements = 2, F = 0.01}\n'
+        '[[analyses]]\ntype = "frequency_response"\nomega = [100.0, 140.0]\n'
+    )
+    status, _, err = suboctave("check", path)
+    assert status == 0, err
+    path.write_text(path.read_text().replace("elements = 2", "elements = 2.5"))
+    assert "elements=2.5" in suboctave("check", path)[2]

@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from suboctave.errors import InputError
+from suboctave.errors import InputError, is_number, shortened
 from suboctave.model.elements.base import BaseElement
 from suboctave.model.elements.coupled import Expression
 from suboctave.model.elements.springs import CubicSpring
@@ -19,6 +19,7 @@ from suboctave.model.loads import HarmonicLoad, RotatingUnbalance
 from suboctave.model.system import System
 
 __all__ = [
+    "chain_with_stop",
     "duffing",
     "jeffcott_rotor",
     "mathieu_duffing",
@@ -207,3 +208,31 @@ def two_mass_unilateral(
         [[1.0, -1.0], [-1.0, 2.0]],
     )
     return _forced("two masses with a one-sided stop", parameters, elements, matrices, dof=1)
+
+
+def chain_with_stop(
+    masses: int = 10,
+    Kc: float = 1.0,
+    gap: float = 1.0,
+    F: float = 0.15,
+    alpha: float = 0.01,
+    beta: float = 0.02,
+) -> System:
+    """Unit masses in a row on unit springs, the first one on the ground, the last one against a one-sided stop.
+
+    `F cos(omega t)` acts on the first mass, the stop of stiffness `Kc` beyond `gap` on the last; damping
+    `alpha M + beta K`. No units. Natural frequencies `2 sin((2 i - 1) pi / (4 masses + 2))`, i = 1, 2, ...: a structure
+    of any size whose modes are known. The matrices are sparse.
+    """
+    if not is_number(masses) or masses != int(masses) or masses < 1:
+        raise InputError(f"masses={shortened(masses)}: a whole number from 1 on", ("masses",))
+    from scipy.sparse import diags_array, eye_array
+
+    diagonal = [2.0] * (int(masses) - 1) + [1.0]
+    beside = [-1.0] * (int(masses) - 1)
+    stiffness = diags_array([beside, diagonal, beside], offsets=[-1, 0, 1]).tocsr()
+    mass = eye_array(int(masses), format="csr")
+    elements = [ElasticStop(dof=int(masses) - 1, stiffness="Kc", gap="gap", side="right")]
+    parameters = {"Kc": Kc, "gap": gap, "F": F, "alpha": alpha, "beta": beta}
+    matrices = mass, {"alpha": mass, "beta": stiffness}, stiffness
+    return _forced("chain with a stop", parameters, elements, matrices)

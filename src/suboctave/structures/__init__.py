@@ -3,6 +3,11 @@
 from suboctave.structures.damping import ModalDamping as ModalDamping, Rayleigh as Rayleigh
 from suboctave.structures.dof_map import DofMap as DofMap
 from suboctave.structures.mesh import Mesh as Mesh
+from suboctave.structures.published import (
+    cantilever_beam as cantilever_beam,
+    clearance_plate as clearance_plate,
+    clearance_plate_structure as clearance_plate_structure,
+)
 from suboctave.structures.sources import (
     beam as beam,
     from_skfem as from_skfem,

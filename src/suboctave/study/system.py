@@ -42,8 +42,10 @@ class SystemSection(Section):
 
 
 def published() -> dict[str, Any]:
-    """The systems of `so.library`, by name."""
-    functions = {name: getattr(library, name) for name in library.__all__}
+    """The systems of `so.library` and the published ones of `so.structures`, by name."""
+    from suboctave.structures import published as structures
+
+    functions = {name: getattr(room, name) for room in (library, structures) for name in room.__all__}
     return {n: f for n, f in functions.items() if inspect.signature(f).return_annotation in ("System", System)}
 
 
@@ -109,7 +111,10 @@ def _published(section: SystemSection, mistakes: Mistakes) -> System | None:
     if wrong or missing:
         return None
     try:
-        system = function(**given)
+        # whole numbers of a study file are read as floats
+        system = function(
+            **{name: int(v) if known[name].annotation == "int" and v == int(v) else v for name, v in given.items()}
+        )
     except (InputError, TypeError, ZeroDivisionError) as error:
         mistakes.add(("system", "library"), str(error))
         return None
