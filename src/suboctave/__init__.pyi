@@ -86,12 +86,16 @@ from .model import (
     library as library,
 )
 from .pictures import (
+    animate_shape as animate_shape,
     plot as plot,
     plot_history as plot_history,
     plot_phase as plot_phase,
+    plot_shape as plot_shape,
     plot_space as plot_space,
     plot_spectrum as plot_spectrum,
+    to_pyvista as to_pyvista,
     write_report as write_report,
+    write_vtu as write_vtu,
 )
 from .results import BifurcationDiagram as BifurcationDiagram, Branch as Branch
 from .structures import (

@@ -11,9 +11,12 @@ from suboctave.pictures.options import View
 from suboctave.pictures.paper import save_figure
 from suboctave.pictures.report import write_report
 from suboctave.pictures.response import draw_response, plot, plot_panels, plot_response
+from suboctave.pictures.shapes import animate_shape, plot_shape
+from suboctave.pictures.vtk import to_pyvista, write_vtu
 
 __all__ = [
     "View",
+    "animate_shape",
     "draw_response",
     "plot",
     "plot_boundaries",
@@ -21,8 +24,11 @@ __all__ = [
     "plot_panels",
     "plot_phase",
     "plot_response",
+    "plot_shape",
     "plot_space",
     "plot_spectrum",
     "save_figure",
+    "to_pyvista",
     "write_report",
+    "write_vtu",
 ]
