@@ -222,10 +222,10 @@ class _Shape:
     def palette(self) -> np.ndarray:
         """The 256 colours (256, 3), from 0 to 255, that its pictures consist of: those of the values, and greys."""
         low, high = self.colours.get_clim()
-        values = self.colours.to_rgba(np.linspace(low, high, 200), bytes=True)[:, :3]
+        values = self.colours.to_rgba(np.linspace(low, high, 216), bytes=True)[:, :3]
         ink = 255.0 * np.array(style.rgb(style.INK))
-        greys = ink + (255.0 - ink) * np.linspace(0.0, 1.0, 56)[:, None]
-        return np.concatenate([values, greys]).astype(np.uint8)
+        greys = ink + (255.0 - ink) * np.linspace(0.0, 1.0, 40)[:, None]
+        return np.concatenate([values, np.round(greys)]).astype(np.uint8)
 
     def show(self, index: int) -> None:
         """Draw one of the fields in the place of the one before."""
