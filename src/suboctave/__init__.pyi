@@ -104,6 +104,7 @@ from .structures import (
     ModalDamping as ModalDamping,
     Rayleigh as Rayleigh,
     Structure as Structure,
+    read_structure as read_structure,
 )
 from .study.results import Results as Results, load as load
 from .verification import stability as stability, verify as verify

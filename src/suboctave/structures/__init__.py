@@ -2,6 +2,7 @@
 
 from suboctave.structures.damping import ModalDamping as ModalDamping, Rayleigh as Rayleigh
 from suboctave.structures.dof_map import DofMap as DofMap
+from suboctave.structures.files import read_structure as read_structure
 from suboctave.structures.mesh import Mesh as Mesh
 from suboctave.structures.published import (
     cantilever_beam as cantilever_beam,

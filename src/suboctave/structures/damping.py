@@ -58,6 +58,10 @@ class Rayleigh:
         spread = (w2 - w1) * (w2 + w1)
         return cls(2 * w1 * w2 * (z1 * w2 - z2 * w1) / spread, 2 * (z2 * w2 - z1 * w1) / spread)
 
+    def text(self, name: str) -> str:
+        """One of its numbers or expressions as a text."""
+        return self._read(name).text
+
     @property
     def constant(self) -> bool:
         """Whether both are numbers."""

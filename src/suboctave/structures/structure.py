@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from numbers import Integral
+from os import PathLike
 from typing import Any
 
 import numpy as np
 
-from suboctave.errors import InputError, located, shortened
+from suboctave.errors import InputError, located, path_of, shortened
 from suboctave.model.elements.base import Array, BaseElement
 from suboctave.model.loads import Load
 from suboctave.model.system import System
@@ -18,6 +19,7 @@ from suboctave.structures.damping import ModalDamping, Rayleigh
 from suboctave.structures.dof_map import DofMap, shown_dofs, weighted
 from suboctave.structures.frequencies import NaturalFrequencies, natural_frequencies
 from suboctave.structures.mesh import Mesh
+from suboctave.structures.numpy_files import write
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -161,6 +163,16 @@ class Structure:
         names = () if self.dofs is None else self.dofs.names
         title = name or self.name
         return System(self.mass, chosen, self.stiffness, elements, loads, parameters, title, names)
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write it to an .npz, which `read_structure` reads; the layout is in `structures/numpy_files.py`."""
+        file = path_of(path)
+        if file.suffix.lower() != ".npz":
+            raise InputError(f"a structure is saved in an .npz file, not in {file.name}")
+        matrices = {"mass": self.mass, "stiffness": self.stiffness}
+        if not isinstance(self.damping, Rayleigh | ModalDamping | None):
+            matrices["damping"] = self.damping
+        write(file, matrices, self.dofs, self.mesh, self.damping, self.name)
 
     def __repr__(self) -> str:
         title = f"Structure {self.name!r}" if self.name else "Structure"

@@ -1,0 +1,143 @@
+"""Nastran's .op4 and .op2 by pyNastran, and .pch, matrices punched as DMIG entries.
+
+.op4 and most .op2 know no labels: those are given with `dofs=`. Entries of DMIG carry node and component; fields are 8
+or, with an asterisk, 16 wide. MSC Nastran Quick Reference Guide, "DMIG".
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from suboctave.errors import InputError
+from suboctave.structures.contents import Contents
+from suboctave.structures.text_lines import text_of
+from suboctave.structures.triplets import LabelledEntries
+
+#: forms of a matrix in DMIG headers: square, symmetric
+_FORMS = {1, 6}
+_GONE = "in1d"
+
+
+def read_op4(path: Path) -> Contents:
+    """All matrices of an .op4 file, text or binary."""
+    with _py_nastran():
+        from pyNastran.op4.op4 import OP4
+    matrices = OP4(debug=None).read_op4(str(path))
+    if not matrices:
+        raise InputError(f"{path.name} holds no matrix")
+    return Contents({name: _whole(matrix) for name, matrix in matrices.items()})
+
+
+def read_op2(path: Path) -> Contents:
+    """All matrices of an .op2 file; with labels where it has them."""
+    with _py_nastran():
+        from pyNastran.op2.op2 import OP2
+    model = OP2(debug=None)
+    model.read_op2(str(path), combine=False)
+    if not model.matrices:
+        raise InputError(f"{path.name} holds no matrix; KGG and MGG are written with PARAM,EXTOUT,DMIGOP2")
+    return Contents({name: _whole(matrix) for name, matrix in model.matrices.items()})
+
+
+@contextmanager
+def _py_nastran() -> Iterator[None]:
+    """Within it pyNastran is imported: version 1.4 asks NumPy for a name that went with NumPy 2.4."""
+    added = not hasattr(np, _GONE)
+    if added:
+        setattr(np, _GONE, np.isin)
+    try:
+        yield
+    except ImportError as error:
+        raise InputError(f"Nastran's binary files need pyNastran: pip install suboctave[fe] ({error})") from None
+    finally:
+        if added:
+            delattr(np, _GONE)
+
+
+def _whole(matrix: Any) -> Any:
+    """The matrix of pyNastran's, a triangle made whole where it says that it is symmetric."""
+    data = matrix.data
+    if matrix.form == 6 and hasattr(data, "tocsr"):
+        import scipy.sparse
+
+        rows = scipy.sparse.csr_array(data)
+        lower, upper = scipy.sparse.tril(rows, -1), scipy.sparse.triu(rows, 1)
+        if bool(lower.nnz) != bool(upper.nnz):
+            return rows + (lower + upper).T
+    return data
+
+
+# ------------------------------------------------------------------------------------------------------------- punched
+def read_punch(path: Path) -> Contents:
+    """All matrices of a .pch file, with node and component of their rows."""
+    entries: dict[str, list[tuple[int, int, int, int, float]]] = {}
+    column: tuple[str, int, int] | None = None
+    for number, line in enumerate(text_of(path).splitlines(), 1):
+        text = line[:72].rstrip()
+        if not text or text.startswith("$"):
+            continue
+        try:
+            head, fields = _fields(text)
+            if head.startswith("DMIG"):
+                name = fields[0]
+                if fields[1] == "0":
+                    _check_header(name, fields, path.name)
+                    entries.setdefault(name, [])
+                    column = None
+                    continue
+                column, fields = (name, int(fields[1]), int(fields[2] or 0)), fields[4:]
+                entries.setdefault(name, [])
+            elif not head.startswith(("*", "+", " ")) and head:
+                column = None  # another entry of the bulk data
+                continue
+            if column is None:
+                continue
+            for node, component, value in _groups(fields):
+                entries[column[0]].append((node, component, *column[1:], value))
+        except (ValueError, IndexError):
+            raise InputError(f"{path.name}, line {number} is no DMIG entry: {text[:60]!r}") from None
+    if not any(entries.values()):
+        raise InputError(f"{path.name} holds no DMIG matrix")
+    matrices = {}
+    for name, rows in entries.items():
+        places = np.array([row[:4] for row in rows], dtype=np.int64).reshape(-1, 4)
+        values = np.array([row[4] for row in rows], dtype=float)
+        matrices[name] = LabelledEntries(places[:, :2], places[:, 2:], values)
+    return Contents(matrices)
+
+
+def _fields(text: str) -> tuple[str, list[str]]:
+    """The first field of an entry, and the others."""
+    if "," in text:
+        head, *fields = [field.strip() for field in text.split(",")]
+        return head, fields
+    width = 16 if "*" in text[:8] else 8
+    fields = [text[start : start + width].strip() for start in range(8, 72, width)]
+    return text[:8].strip(), fields
+
+
+def _check_header(name: str, fields: list[str], file: str) -> None:
+    form, kind = int(fields[2]), int(fields[3])
+    if form not in _FORMS:
+        raise InputError(f"{file}: {name} is a matrix of form {form}; square (1) and symmetric (6) ones are read")
+    if kind > 2:
+        raise InputError(f"{file}: {name} is complex; an equation of motion in time needs real matrices")
+
+
+def _groups(fields: list[str]) -> Iterator[tuple[int, int, float]]:
+    """Node, component and value of the entries of a line; there is one in a wide line, two in a narrow one."""
+    for start in range(0, len(fields) - 2, 4):
+        node, component, value = fields[start : start + 3]
+        if node:
+            yield int(node), int(component or 0), _number(value)
+
+
+def _number(text: str) -> float:
+    """A number of Nastran: 1.5-3 and 1.5D-3 are 1.5E-3."""
+    return float(re.sub(r"(?<=[\d.])([+-]\d+)$", r"E\1", text.upper().replace("D", "E")))
