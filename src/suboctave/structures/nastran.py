@@ -100,6 +100,8 @@ def read_punch(path: Path) -> Contents:
                 continue
             for node, component, value in _groups(fields):
                 entries[column[0]].append((node, component, *column[1:], value))
+        except InputError:
+            raise
         except (ValueError, IndexError):
             raise InputError(f"{path.name}, line {number} is no DMIG entry: {text[:60]!r}") from None
     if not any(entries.values()):

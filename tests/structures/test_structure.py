@@ -1,0 +1,329 @@
+"""Structures: labels, natural frequencies, damping, systems; and what is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.linalg
+import scipy.sparse
+
+import suboctave as so
+
+
+def beam(elements: int) -> so.Structure:
+    """A free Euler-Bernoulli beam of length 1 with EI = 1, rho A = 1."""
+    h, n = 1.0 / elements, 2 * (elements + 1)
+    k = np.array([[12, 6, -12, 6], [6, 4, -6, 2], [-12, -6, 12, -6], [6, 2, -6, 4]]) / h**3
+    m = np.array([[156, 22, 54, -13], [22, 4, 13, -3], [54, 13, 156, -22], [-13, -3, -22, 4]]) * h / 420
+    scale = np.array([1, h, 1, h])
+    mass, stiffness = np.zeros((n, n)), np.zeros((n, n))
+    for e in range(elements):
+        place = slice(2 * e, 2 * e + 4)
+        mass[place, place] += m * scale[:, None] * scale
+        stiffness[place, place] += k * scale[:, None] * scale
+    return so.Structure(mass, stiffness, dofs=[(i, d) for i in range(elements + 1) for d in ("z", "ry")])
+
+
+# -------------------------------------------------------------------------------------------------------------- labels
+@pytest.mark.parametrize("node", [1042, "1042", "node 1042", "Node_1042", np.int64(1042)])
+@pytest.mark.parametrize("direction", ["z", "Z", 3, "3", "uz", "T3", np.int32(3)])
+def test_a_dof_is_found_as_users_write_it(structure, node, direction):
+    assert structure.dof(node, direction) == 1
+
+
+@pytest.mark.parametrize("text", ["1042 z", "node 1042 Z", "1042:z", "1042, 3", " 1042  z "])
+def test_node_and_direction_may_be_one_text(structure, text):
+    assert structure.dof(text) == 1
+
+
+@pytest.mark.parametrize(
+    ("place", "message"),
+    [
+        ((1024, "z"), "there is no node 1024; nearest: 1042, .*; there are 4 nodes, 7 to 1042"),
+        ((1042, "y"), "node 1042 has no direction 'y'; it has x, z"),
+        ((1042, "rx"), "node 1042 has no direction 'rx'"),
+        (("somewhere",), "is no DOF: write node and direction"),
+        ((1042.5, "z"), "a node is a whole number or a text"),
+        ((True, "z"), "a node is a whole number or a text"),
+        ((1042, 1.5), "a direction is one of x, y, z"),
+        ((3,), "a DOF is given by node and direction"),
+    ],
+)
+def test_a_dof_that_is_not_there_is_told_with_what_is_near(structure, place, message):
+    with pytest.raises(so.InputError, match=message):
+        structure.dof(*place)
+
+
+def test_nodes_may_be_texts_and_negative():
+    dofs = so.DofMap([("plate.12", "x"), ("Plate.13", "x"), (-4, "z"), (5, "temperature")])
+    assert (dofs.index("PLATE.12", "x"), dofs.index("-4", "z"), dofs.index(5, "Temperature")) == (0, 2, 3)
+    with pytest.raises(so.InputError, match=r"did you mean 'plate\.12'"):
+        dofs.index("plate12", "x")
+
+
+def test_fixed_dofs_are_gone_and_said(structure, chain):
+    held = structure.fixed([(1042, "z"), "7 x", 4, (77, "z")])
+    assert held.n == 4
+    kept = [i for i in range(8) if i not in (1, 2, 4, 5)]
+    np.testing.assert_array_equal(held.stiffness.toarray(), chain.stiffness[np.ix_(kept, kept)])
+    assert held.dof(300, "x") == 2
+    with pytest.raises(so.InputError, match="1042 z is fixed"):
+        held.dof(1042, "z")
+    with pytest.raises(so.InputError, match="all DOFs of node 77 are fixed"):
+        held.dof(77, "y")
+    with pytest.raises(so.InputError, match=r"has no direction 'y'; it has x \(fixed: z\)"):
+        held.dof(1042, "y")
+
+
+def test_a_weighted_direction(structure):
+    vector = structure.direction({(1042, "z"): 1.0, "77 z": -0.5})
+    assert list(vector) == [0, 1, 0, 0, 0, -0.5, 0, 0]
+    for wrong in ({}, {(1042, "z"): "a"}, {(1042, "z"): np.nan}, [1, 2]):
+        with pytest.raises(so.InputError):
+            structure.direction(wrong)
+
+
+def test_without_labels_dofs_are_numbers(chain):
+    structure = so.Structure(chain.mass, chain.stiffness)
+    assert structure.fixed([0, 1]).n == 6
+    with pytest.raises(so.InputError, match="no DOF map: its DOFs are the numbers 0 to 7"):
+        structure.dof(1042, "z")
+    with pytest.raises(so.InputError, match="there is no DOF 8"):
+        structure.fixed([8])
+    with pytest.raises(so.InputError, match="nothing is left"):
+        structure.fixed(range(8))
+
+
+# ------------------------------------------------------------------------------------------------- natural frequencies
+def test_frequencies_of_a_chain(structure, chain):
+    found = structure.frequencies(20)
+    np.testing.assert_allclose(found.omega, chain.omega, rtol=1e-13)
+    np.testing.assert_allclose(found.hertz, chain.omega / (2 * np.pi), rtol=1e-13)
+    assert "rad per unit time" in str(found)
+    assert "Hz" in str(found)
+    assert "rigid" not in str(found)
+    np.testing.assert_allclose(found.modes.T @ structure.mass @ found.modes, np.eye(8), atol=1e-12)
+
+
+@pytest.mark.parametrize("elements", [40, 400])
+def test_a_free_beam_has_two_rigid_body_modes(elements):
+    """Densely and by Lanczos's method; (beta l)^2 of the first elastic ones from cos(beta) cosh(beta) = 1."""
+    found = beam(elements).frequencies(5)
+    assert found.rigid == 2
+    assert "2 rigid-body modes" in str(found)
+    expected = np.array([4.730040744862704, 7.853204624095838, 10.99560783800167]) ** 2
+    np.testing.assert_allclose(found.omega[2:], expected, rtol=1e-5)
+    assert np.all(found.omega[:2] < 1e-2)
+
+
+def test_units_do_not_matter():
+    one = beam(200)
+    other = so.Structure(one.mass * 1e-9, one.stiffness * 1e6)
+    np.testing.assert_allclose(other.frequencies(6).omega[2:], one.frequencies(6).omega[2:] * 10**7.5, rtol=1e-6)
+    assert other.frequencies(6).rigid == 2
+
+
+def test_massless_dofs_are_said_and_do_not_spoil_frequencies(chain):
+    """Exact condensation of a massless DOF leaves the frequencies of what it hangs on."""
+    mass = chain.mass.copy()
+    mass[3, 3] = 0.0
+    structure = so.Structure(mass, chain.stiffness, dofs=chain.labels)
+    assert structure.massless == (3,)
+    assert "no inertia 7 z" in repr(structure)
+    keep = [i for i in range(8) if i != 3]
+    k = chain.stiffness
+    condensed = k[np.ix_(keep, keep)] - np.outer(k[keep, 3], k[3, keep]) / k[3, 3]
+    exact = np.sqrt(scipy.linalg.eigvalsh(condensed))
+    np.testing.assert_allclose(structure.frequencies(9).omega, exact, rtol=1e-12)
+    with pytest.raises(so.InputError, match=r"DOFs without inertia: 7 z; .* structure.fixed"):
+        structure.system()
+
+
+def test_constraints_by_multipliers_hold_what_they_constrain(chain):
+    """A multiplier that holds the first DOF, against the structure with that DOF fixed."""
+    mass, stiffness = np.zeros((9, 9)), np.zeros((9, 9))
+    mass[:8, :8], stiffness[:8, :8] = chain.mass, chain.stiffness
+    stiffness[8, 0] = stiffness[0, 8] = 1.0
+    bound = so.Structure(mass, stiffness)
+    held = so.Structure(chain.mass, chain.stiffness).fixed([0])
+    np.testing.assert_allclose(bound.frequencies(7).omega, held.frequencies(7).omega, rtol=1e-9)
+
+
+def test_a_buckled_structure_is_said():
+    structure = so.Structure(np.eye(3), np.diag([-4.0, 1.0, 9.0]))
+    found = structure.frequencies()
+    np.testing.assert_allclose(found.omega, [-2.0, 1.0, 3.0])
+    assert "at rest is unstable" in str(found)
+
+
+@pytest.mark.parametrize("count", [0, -1, 1.5, "a", True])
+def test_a_count_of_frequencies_is_a_whole_number(structure, count):
+    with pytest.raises(so.InputError, match="how many natural frequencies"):
+        structure.frequencies(count)
+
+
+# -------------------------------------------------------------------------------------------------------------- damping
+def test_rayleigh_from_ratios_has_these_ratios(structure, chain):
+    damping = so.Rayleigh.from_ratios((chain.omega[0], 0.01), (chain.omega[4], 0.02))
+    found = structure.frequencies(8)
+    c = damping.matrix(structure.mass, structure.stiffness)
+    ratios = np.diag(found.modes.T @ c @ found.modes) / (2 * found.omega)
+    np.testing.assert_allclose(ratios[[0, 4]], [0.01, 0.02], rtol=1e-10)
+
+
+@pytest.mark.parametrize(
+    "pairs", [((1, 0.1), (1, 0.1)), ((0, 0.1), (1, 0.1)), ((1, 0.1), (2, -1)), (1, 2), ((1,), (2,))]
+)
+def test_rayleigh_refuses_what_has_no_answer(pairs):
+    with pytest.raises(so.InputError, match="from_ratios"):
+        so.Rayleigh.from_ratios(*pairs)
+
+
+def test_rayleigh_may_depend_on_parameters(structure):
+    system = structure.system(parameters={"a": 0.1, "b": 0.2}, damping=so.Rayleigh("a", "2*b"))
+    _, c, k = system.matrices()
+    np.testing.assert_allclose(c, 0.1 * np.eye(8) + 0.4 * k)
+    _, c, _ = structure.system(parameters={"a": 0.1}, damping=so.Rayleigh("a", "a")).matrices()
+    np.testing.assert_allclose(c, 0.1 * (np.eye(8) + k))
+
+
+@pytest.mark.parametrize(
+    "damping", [so.ModalDamping(0.02), so.ModalDamping([0.02, 0.02]), so.ModalDamping(0.02, count=2)]
+)
+def test_modal_damping_damps_modes(structure, damping):
+    found = structure.frequencies(8)
+    c = structure.with_damping(damping).system().matrices()[1]
+    ratios = np.diag(found.modes.T @ c @ found.modes) / (2 * found.omega)
+    np.testing.assert_allclose(ratios[:2], 0.02)
+    np.testing.assert_allclose(ratios[2:], 0.02 if damping == so.ModalDamping(0.02) else 0.0, atol=1e-15)
+
+
+def test_rigid_body_modes_stay_undamped():
+    structure = beam(4)
+    c = so.ModalDamping(0.05).matrix(structure.mass, structure.stiffness)
+    translation = structure.direction({(i, "z"): 1.0 for i in range(5)})
+    assert np.abs(c @ translation).max() < 1e-8 * np.abs(c.toarray()).max()
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: so.ModalDamping(-0.1),
+        lambda: so.ModalDamping([]),
+        lambda: so.ModalDamping("a"),
+        lambda: so.ModalDamping([0.1], count=2),
+        lambda: so.ModalDamping(0.1, count=0),
+        lambda: so.Rayleigh("a +"),
+        lambda: so.Rayleigh(np.nan),
+    ],
+)
+def test_what_is_no_damping_is_refused(make):
+    with pytest.raises(so.InputError):
+        make()
+
+
+def test_modal_damping_of_a_large_structure_points_to_rayleigh():
+    n = 2001
+    with pytest.raises(so.InputError, match="Rayleigh"):
+        so.Structure(scipy.sparse.eye_array(n), scipy.sparse.eye_array(n)).system(damping=so.ModalDamping(0.1))
+
+
+# -------------------------------------------------------------------------------------------------------------- systems
+def test_elements_stand_at_labelled_places(structure):
+    system = structure.system(
+        elements=[so.ElasticStop(dof=structure.dof("node 1042", "z"), stiffness="k", gap=0.1)],
+        loads=[so.HarmonicLoad(direction=structure.direction({(7, "x"): 1.0, (77, "x"): 1.0}), amplitude=0.2)],
+        parameters={"k": 5.0},
+        damping=so.Rayleigh(0.05),
+    )
+    assert system.dof_names[:2] == ("1042 x", "1042 z")
+    assert system.name == "chain"
+    assert "1042 z" in repr(system)
+    np.testing.assert_array_equal(system.elements[0].direction(8), np.eye(8)[1])
+
+
+def test_a_stop_that_is_never_reached_leaves_the_linear_response(structure, chain):
+    """The response curve against (K - omega^2 M + i omega C)^-1 p."""
+    system = structure.system(
+        elements=[so.ElasticStop(dof=structure.dof(1042, "z"), stiffness=5.0, gap=100.0)],
+        loads=[so.HarmonicLoad(dof=structure.dof(1042, "z"), amplitude=0.2)],
+        damping=so.Rayleigh(0.05, 0.01),
+    )
+    orbit = so.periodic_orbit(system, 1.3, np.zeros(16))
+    c = 0.05 * chain.mass + 0.01 * chain.stiffness
+    exact = np.linalg.solve(chain.stiffness - 1.3**2 * chain.mass + 1.3j * c, 0.2 * np.eye(8)[1])
+    assert orbit.amplitude(1) == pytest.approx(abs(exact[1]), rel=1e-9)
+
+
+def test_the_text_of_a_structure_tells_sizes(structure):
+    text = repr(structure.with_damping(so.Rayleigh(0.1, 0.2)))
+    assert "Structure 'chain': 8 DOFs (1042 x, 1042 z, 7 x, 7 z, ...)" in text
+    assert "mass 8, stiffness 20" in text
+    assert "Rayleigh(alpha=0.1, beta=0.2)" in text
+
+
+# ---------------------------------------------------------------------------------------------------------- wrong input
+EYE = np.eye(3)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"stiffness": np.eye(4)}, r"the stiffness is 4 x 4, the mass 3 x 3"),
+        ({"stiffness": np.ones((3, 2))}, "the stiffness must be square, not 3 x 2"),
+        ({"stiffness": np.zeros((0, 0)), "mass": np.zeros((0, 0))}, "must be square"),
+        ({"stiffness": np.ones(3)}, "must be a matrix of numbers, not of shape"),
+        ({"stiffness": "K.npz"}, "must be a matrix of numbers"),
+        ({"stiffness": None}, "the stiffness is missing"),
+        ({"stiffness": EYE * (1 + 0.1j)}, "the stiffness is complex: structural"),
+        ({"stiffness": np.array([[1, 0, 0], [0, np.nan, 0], [0, 0, 1]])}, r"not finite: \[1, 1\] is nan"),
+        (
+            {"stiffness": np.array([[1, 0, 0], [0, 1, 2], [0, 2.5, 1]])},
+            r"not symmetric: \[1, 2\] is 2, \[2, 1\] is 2.5",
+        ),
+        ({"stiffness": np.tril(np.ones((3, 3)))}, "only the lower triangle has entries"),
+        ({"mass": np.triu(np.ones((3, 3)))}, "the mass is not symmetric.*only the upper triangle"),
+        ({"mass": np.diag([1.0, -1.0, 1.0])}, "the mass is not positive definite.*DOFs 1"),
+        ({"mass": np.zeros((3, 3))}, "no DOF has inertia"),
+        ({"damping": np.eye(2)}, "the damping is 2 x 2"),
+        ({"damping": 3.0}, "the damping must be a matrix"),
+        ({"dofs": [(1, "x"), (2, "x")]}, "the DOF map has 2 labels, the matrices 3 DOFs"),
+        ({"dofs": [(1, "x"), (2, "x"), ("node 1", 1)]}, "names 1 x more than once"),
+        ({"dofs": [1, 2, 3]}, "pairs .node, direction."),
+        ({"mesh": 3}, "mesh must be a Mesh"),
+    ],
+)
+def test_what_is_no_structure_is_refused(arguments, message):
+    with pytest.raises(so.InputError, match=message) as caught:
+        so.Structure(**{"mass": EYE, "stiffness": EYE, **arguments})
+    assert "\n" not in str(caught.value)
+
+
+def test_asymmetry_is_judged_in_any_units():
+    """Rotations of a beam in millimetres are 1e6 times as stiff as displacements: rounding there is none here."""
+    stiffness = np.array([[1.0, 1e3], [1e3 * (1 + 1e-12), 1e9]])
+    assert so.Structure(np.eye(2), stiffness).stiffness[0, 1] == so.Structure(np.eye(2), stiffness).stiffness[1, 0]
+    stiffness[1, 0] = 1e3 * (1 + 1e-4)
+    with pytest.raises(so.InputError, match="not symmetric"):
+        so.Structure(np.eye(2), stiffness)
+
+
+def test_a_structure_does_not_change(structure):
+    with pytest.raises(AttributeError):
+        structure.name = "other"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"points": [1, 2]}, r"an array \(N, 3\)"),
+        ({"points": [[0, 0, np.inf]]}, "not finite"),
+        ({"cells": {"line": [[0, 5]]}}, "there is no point 5, only 0 to 1"),
+        ({"cells": {"line": [0, 1]}}, "'line' of a mesh"),
+        ({"cells": [1]}, "a mapping"),
+        ({"nodes": [1, 1]}, "2 different labels"),
+    ],
+)
+def test_what_is_no_mesh_is_refused(arguments, message):
+    with pytest.raises(so.InputError, match=message):
+        so.Mesh(**{"points": [[0, 0], [1, 0]], "cells": {"line": [[0, 1]]}, **arguments})
