@@ -129,6 +129,11 @@ class DofMap:
             raise InputError(self._missing(*label))
         return place
 
+    def of_node(self, text: str) -> list[int]:
+        """The degrees of freedom of a node, "node 1042" or "1042"; none where the text is not the name of one."""
+        node = node_label(text)
+        return [i for i, (other, _) in enumerate(self.labels) if other == node] if node in self._nodes else []
+
     def without(self, dofs: Sequence[int]) -> DofMap:
         """The map of what is left when these degrees of freedom are fixed."""
         gone = set(dofs)

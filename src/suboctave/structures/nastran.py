@@ -35,14 +35,17 @@ def read_op4(path: Path) -> Contents:
 
 
 def read_op2(path: Path) -> Contents:
-    """All matrices of an .op2 file; with labels where it has them."""
+    """All matrices of an .op2 file, but for those of MATPOOL, whose labels pyNastran mixes up."""
     with _py_nastran():
         from pyNastran.op2.op2 import OP2
     model = OP2(debug=None)
     model.read_op2(str(path), combine=False)
-    if not model.matrices:
-        raise InputError(f"{path.name} holds no matrix; KGG and MGG are written with PARAM,EXTOUT,DMIGOP2")
-    return Contents({name: _whole(matrix) for name, matrix in model.matrices.items()})
+    matrices = {name: _whole(matrix) for name, matrix in model.matrices.items() if not matrix.is_matpool}
+    if not matrices:
+        raise InputError(
+            f"{path.name} holds no matrix such as KGG; write them to .op4, or punch them (EXTOUT, DMIGPCH)"
+        )
+    return Contents(matrices)
 
 
 @contextmanager

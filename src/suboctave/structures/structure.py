@@ -100,11 +100,12 @@ class Structure:
     def fixed(self, dofs: Iterable[Any]) -> Structure:
         """The structure with some degrees of freedom held: their rows and columns go.
 
-        `dofs`: numbers from 0, pairs (node, direction), or texts like "1042 z". Raises `InputError` for what is none.
+        `dofs`: numbers from 0, pairs (node, direction), texts like "1042 z", or "node 1042" for all of a node. Raises
+        `InputError` for what is none.
         """
         if isinstance(dofs, str | Integral) or not isinstance(dofs, Iterable):
             raise InputError(f"fixed takes a list of DOFs, not {shortened(dofs)}")
-        gone = sorted({self._place(item) for item in dofs})
+        gone = sorted({place for item in dofs for place in self._places(item)})
         kept = np.setdiff1d(np.arange(self.n), gone)
         if not len(kept):
             raise InputError("all DOFs would be fixed: nothing is left that moves")
@@ -113,15 +114,16 @@ class Structure:
             cut["damping"] = self.damping[kept][:, kept]
         return replace(self, **cut, dofs=None if self.dofs is None else self.dofs.without(gone))
 
-    def _place(self, item: Any) -> int:
+    def _places(self, item: Any) -> Sequence[int]:
         if isinstance(item, Integral) and item is not True and item is not False:
             place = int(item)
             if not 0 <= place < self.n:
                 raise InputError(f"there is no DOF {place}: they are numbered 0 to {self.n - 1}")
-            return place
+            return [place]
         if isinstance(item, Sequence) and not isinstance(item, str) and len(item) == 2:
-            return self.dof(*item)
-        return self.dof(item)
+            return [self.dof(*item)]
+        of_node = self._labels().of_node(item) if isinstance(item, str) else ()
+        return of_node or [self.dof(item)]
 
     # --------------------------------------------------------------------------------------------------------- motion
     def with_damping(self, damping: Any) -> Structure:
@@ -149,20 +151,25 @@ class Structure:
         `damping`: in the place of its own, a matrix, `Rayleigh` (its numbers may be expressions in parameters) or
         `ModalDamping`. The other arguments are those of `System`; names of DOFs are the labels, "1042 z".
         """
+        structure = self if damping is None else self.with_damping(damping)
+        names = () if self.dofs is None else self.dofs.names
+        return System(*structure.matrices(), elements, loads, parameters, name or self.name, names)
+
+    def matrices(self) -> tuple[Any, Any, Any]:
+        """`(M, C, K)` as a `System` takes them; zeros without damping, `{expression: matrix}` where it has parameters.
+
+        Raises `InputError` for degrees of freedom without inertia.
+        """
         if self.massless:
             what = shown_dofs(self.massless, self.dofs)
             raise InputError(
                 f"DOFs without inertia: {what}; every DOF of a system needs some. Hold those that do not matter with "
                 "structure.fixed([...]), or reduce the model where it was made"
             )
-        chosen = self.damping if damping is None else damping
-        if isinstance(chosen, Rayleigh | ModalDamping):
-            chosen = chosen.matrix(self.mass, self.stiffness)
-        elif chosen is None:
-            chosen = 0.0 * self.mass
-        names = () if self.dofs is None else self.dofs.names
-        title = name or self.name
-        return System(self.mass, chosen, self.stiffness, elements, loads, parameters, title, names)
+        damping = self.damping
+        if isinstance(damping, Rayleigh | ModalDamping):
+            damping = damping.matrix(self.mass, self.stiffness)
+        return self.mass, 0.0 * self.mass if damping is None else damping, self.stiffness
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write it to an .npz, which `read_structure` reads; the layout is in `structures/numpy_files.py`."""

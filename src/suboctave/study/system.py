@@ -6,7 +6,7 @@ Matrices are numbers and expressions inline, or files beside the study (.npy, .n
 from __future__ import annotations
 
 import inspect
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -19,19 +19,22 @@ from suboctave.model import library
 from suboctave.model.description import build_part
 from suboctave.model.matrices import matrix_coefficient
 from suboctave.model.system import System
+from suboctave.structures.structure import Structure
 from suboctave.study.mistakes import Mistakes, Section
+from suboctave.study.structures import DofNames, given_structure
 
 MATRICES = ("mass", "damping", "stiffness")
 SUFFIXES = (".npy", ".npz", ".mtx", ".mat", ".csv")
 
 
 class SystemSection(Section):
-    """What vibrates: matrices with elements and loads, equations as text, or a published system."""
+    """What vibrates: matrices or a structure with elements and loads, equations as text, or a published system."""
 
     name: str = ""
     library: str | None = None
     arguments: dict[str, float] = Field(default_factory=dict)
     equations: list[str] | None = None
+    structure: Any = None
     mass: Any = None
     damping: Any = None
     stiffness: Any = None
@@ -52,25 +55,33 @@ def published() -> dict[str, Any]:
 def make_system(section: SystemSection, folder: Path, mistakes: Mistakes, allow_code: bool) -> System | None:
     """The system, or None where something is wrong with it."""
     before = len(mistakes)
-    given = {what for what in (*MATRICES, "equations", "library") if getattr(section, what) is not None}
-    ways = [bool(given & set(MATRICES)), "equations" in given, "library" in given]
+    given = {what for what in (*MATRICES, "structure", "equations", "library") if getattr(section, what) is not None}
+    ways = [bool(given & set(MATRICES)), "structure" in given, "equations" in given, "library" in given]
     if sum(ways) != 1:
-        how = "mass, damping and stiffness; or equations; or library"
+        how = "mass, damping and stiffness; or structure; or equations; or library"
         mistakes.add(("system",), f"give one of these: {how}" + (", not several of them" if sum(ways) > 1 else ""))
         return None
     if section.arguments and section.library is None:
         mistakes.add(("system", "arguments"), "belong to library")
     if section.library is not None:
         return _published(section, mistakes)
+    structure = _structure(section, folder, mistakes)
+    if section.structure is not None and structure is None:
+        return None
+    names = DofNames(section.dof_names, structure)
     parts: dict[str, list[tuple[Key, Any]]] = {"element": [], "load": []}
     for family, built in parts.items():
         for index, item in enumerate(getattr(section, f"{family}s")):
             place = ("system", f"{family}s", index)
             with mistakes.at(*place):
-                built.append((place, build_part(item, family, allow_code=allow_code)))
+                built.append((place, build_part(names.placed(item), family, allow_code=allow_code)))
     if section.equations is not None:
         return _from_equations(section, parts, mistakes) if len(mistakes) == before else None
-    matrices = _matrices(section, folder, mistakes)
+    if structure is None:
+        matrices = _matrices(section, folder, mistakes)
+        dof_names: Sequence[str] = section.dof_names
+    else:
+        matrices, dof_names = _of_structure(structure, mistakes)
     if "mass" not in matrices:
         return None
     complete = len(mistakes) == before
@@ -79,8 +90,8 @@ def make_system(section: SystemSection, folder: Path, mistakes: Mistakes, allow_
     try:
         # in place of one that is wrong stands zero: what else is wrong is told all the same
         mass, damping, stiffness = (matrices.get(what, 0.0) for what in MATRICES)
-        names = section.parameters, section.name, section.dof_names
-        system = System(mass, damping, stiffness, elements, loads, *names)
+        title = section.name or (structure.name if structure is not None else "")
+        system = System(mass, damping, stiffness, elements, loads, section.parameters, title, dof_names)
     except InputError as error:
         for part in error.parts:
             first, *rest = part.key or ("",)
@@ -90,6 +101,30 @@ def make_system(section: SystemSection, folder: Path, mistakes: Mistakes, allow_
                 mistakes.add(("system", *part.key), str(part))
         return None
     return system if complete else None
+
+
+def _structure(section: SystemSection, folder: Path, mistakes: Mistakes) -> Structure | None:
+    """The structure, or None where there is none, or something is wrong with it."""
+    if section.structure is None:
+        return None
+    if section.dof_names:
+        what = "the structure names its degrees of freedom: leave it out (dofs in the structure names them)"
+        mistakes.add(("system", "dof_names"), what)
+    try:
+        return given_structure(section.structure, folder)
+    except InputError as error:
+        for part in error.parts:
+            mistakes.add(("system", "structure", *part.key), str(part))
+        return None
+
+
+def _of_structure(structure: Structure, mistakes: Mistakes) -> tuple[dict[str, Any], Sequence[str]]:
+    """The matrices of a structure, none where they make no system, and the names of its degrees of freedom."""
+    matrices: dict[str, Any] = {}
+    with mistakes.at("system", "structure"):
+        read = zip(MATRICES, structure.matrices(), strict=True)
+        matrices = {what: matrix_coefficient(matrix, structure.n, what) for what, matrix in read}
+    return matrices, () if structure.dofs is None else structure.dofs.names
 
 
 def _published(section: SystemSection, mistakes: Mistakes) -> System | None:

@@ -1,0 +1,124 @@
+"""The structure of a study file, and degrees of freedom by their names in its elements and loads.
+
+[system]
+structure = "plate.npz"
+structure = { file = "plate.mat", mass = "MGG", fixed = ["node 1", "2 z"], damping = { rayleigh = [0.1, "beta"] } }
+structure = { mass = "M.mtx", stiffness = "K.mtx", dofs = "labels.txt" }
+elements = [{ type = "ElasticStop", dof = ["1042 z", "77 z"], stiffness = 1e5, gap = 0.1 }]
+loads = [{ type = "HarmonicLoad", direction = { "1042 z" = 1.0, "77 z" = -0.5 }, amplitude = 2.0 }]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from suboctave.errors import InputError, located, shortened, suggest
+from suboctave.structures.damping import ModalDamping, Rayleigh
+from suboctave.structures.files import read_structure
+from suboctave.structures.structure import Structure
+
+_KEYS = ("file", "mass", "stiffness", "damping", "dofs", "fixed")
+_DAMPINGS = ("rayleigh", "ratios", "modal")
+
+
+def given_structure(value: Any, folder: Path) -> Structure:
+    """What a study file says of a structure: a file, or a table with the keys above; relative to `folder`.
+
+    `damping` is the name of a matrix, a file, or one of the tables `{ rayleigh = [alpha, beta] }`,
+    `{ ratios = [[omega1, zeta1], [omega2, zeta2]] }`, `{ modal = ratio or ratios }`. Raises InputError, with the key.
+    """
+    if isinstance(value, str):
+        return read_structure(folder / value)
+    if not isinstance(value, Mapping):
+        raise InputError(f"a structure is the name of a file, or a table, not {shortened(value)}")
+    for key, item in value.items():
+        if key not in _KEYS:
+            raise InputError(f"a structure has no key {key!r}{suggest(key, _KEYS)}", (key,))
+        if key in ("file", "mass", "stiffness") and not isinstance(item, str):
+            raise InputError(f"{key} is a text, not {shortened(item)}", (key,))
+    given = dict(value)
+    file, fixed = given.pop("file", None), given.pop("fixed", ())
+    if isinstance(given.get("damping"), Mapping):
+        with located("damping"):
+            given["damping"] = _damping(given["damping"])
+    elif not isinstance(given.get("damping", ""), str):
+        raise InputError(f"damping is a text or a table, not {shortened(given['damping'])}", ("damping",))
+    for what in ("mass", "stiffness", "damping") if file is None else ():
+        if isinstance(given.get(what), str):
+            given[what] = folder / given[what]
+    if isinstance(given.get("dofs"), str):
+        given["dofs"] = folder / given["dofs"]
+    structure = read_structure(None if file is None else folder / file, **given)
+    with located("fixed"):
+        return structure.fixed(fixed) if fixed else structure
+
+
+def _damping(given: Mapping[str, Any]) -> Rayleigh | ModalDamping:
+    if len(given) != 1 or not set(given) <= set(_DAMPINGS):
+        wrong = next((key for key in given if key not in _DAMPINGS), "")
+        raise InputError(f"damping is one of {', '.join(_DAMPINGS)}{suggest(wrong, _DAMPINGS) if wrong else ''}")
+    (kind, value), *_ = given.items()
+    if kind == "modal":
+        return ModalDamping(value)
+    if not isinstance(value, Sequence) or isinstance(value, str) or len(value) != 2:
+        what = "alpha and beta" if kind == "rayleigh" else "[omega1, zeta1] and [omega2, zeta2]"
+        raise InputError(f"{kind} is a list of two, {what}, not {shortened(value)}")
+    return Rayleigh(*value) if kind == "rayleigh" else Rayleigh.from_ratios(*value)
+
+
+@dataclass(frozen=True)
+class DofNames:
+    """Names of degrees of freedom: labels of a structure, or `dof_names` of a system.
+
+    names
+        Those of the system, in the order of its matrices.
+    structure
+        In their place, where there is one.
+    """
+
+    names: Sequence[str]
+    structure: Structure | None
+
+    def placed(self, item: Any) -> Any:
+        """The table of an element or a load, with numbers in the place of names.
+
+        Names stand in `dof`, alone or in a pair, in `perpendicular`, among `inputs`, and as keys of `direction`.
+        """
+        if not isinstance(item, Mapping):
+            return item
+        placed = dict(item)
+        for key in ("dof", "perpendicular"):
+            if key in placed:
+                with located(key):
+                    placed[key] = self._numbered(placed[key])
+        if isinstance(placed.get("inputs"), Mapping):
+            with located("inputs"):
+                placed["inputs"] = {name: self._numbered(place) for name, place in placed["inputs"].items()}
+        if isinstance(placed.get("direction"), Mapping):
+            with located("direction"):
+                placed["direction"] = self._direction(placed["direction"])
+        return placed
+
+    def _numbered(self, place: Any) -> Any:
+        if isinstance(place, list):
+            return [self._numbered(one) for one in place]
+        return self._number(place) if isinstance(place, str) else place
+
+    def _number(self, name: str) -> int:
+        if self.structure is not None:
+            return self.structure.dof(name)
+        if name not in self.names:
+            hint = suggest(name, self.names) or ": give dof_names, or its number from 0"
+            raise InputError(f"there is no DOF {name!r}{hint}")
+        return list(self.names).index(name)
+
+    def _direction(self, weights: Mapping[str, Any]) -> Any:
+        if self.structure is not None:
+            return self.structure.direction(weights)
+        vector = [0.0] * len(self.names)
+        for name, weight in weights.items():
+            vector[self._number(name)] = weight
+        return vector
