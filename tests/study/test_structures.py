@@ -145,3 +145,51 @@ def test_names_of_an_ordinary_system_are_places_too(study_file):
     np.testing.assert_array_equal(system.loads[1].place.direction(2), [-0.5, 1.0])
     with pytest.raises(so.InputError, match=r"there is no DOF 'tp' \(did you mean 'tip'\?\)"):
         read_study(study_file(text.replace('dof = "tip"', 'dof = "tp"')))
+
+
+BEAM = """
+[system]
+structure = { source = "beam", length = 0.7, width = 0.014, height = 0.014, young = 2.05e11, density = 7800.0, \
+elements = 3, damping = { rayleigh = [3.0, "beta"] } }
+parameters = { beta = 1e-6, gap = 1e-3 }
+elements = [{ type = "ElasticStop", dof = "3 z", stiffness = 1e5, gap = "gap" }]
+loads = [{ type = "HarmonicLoad", dof = "3 z", amplitude = 0.2 }]
+
+[[analyses]]
+name = "response"
+type = "frequency_response"
+omega = [100.0, 105.0]
+"""
+
+
+def test_a_beam_needs_no_file(study_file):
+    from suboctave.structures import beam
+
+    structure = beam(0.7, 0.014, 0.014, 2.05e11, 7800.0, 3)
+    script = structure.system(
+        [so.ElasticStop(dof=structure.dof(3, "z"), stiffness=1e5, gap="gap")],
+        [so.HarmonicLoad(dof=structure.dof(3, "z"), amplitude=0.2)],
+        {"beta": 1e-6, "gap": 1e-3},
+        so.Rayleigh(3.0, "beta"),
+    )
+    system = read_study(study_file(BEAM)).system
+    assert repr(system) == repr(script)
+    for ours, theirs in zip(system.matrices(), script.matrices(), strict=True):
+        np.testing.assert_array_equal(ours, theirs)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "text"),
+    [
+        ('"beam"', '"beem"', "line 3: system.structure.source: there is no source 'beem' (did you mean 'beam'?)"),
+        ("width", "with", "a beam has no argument 'with' (did you mean 'width'?)"),
+        ("length = 0.7, ", "", "a beam needs length"),
+        ("height = 0.014", "height = -1.0", "height=-1.0: must be above 0"),
+        ("rayleigh = [3.0", "rayleih = [3.0", "did you mean 'rayleigh'?"),
+        ('damping = { rayleigh = [3.0, "beta"] }', "damping = 3.0", "damping is one of rayleigh"),
+    ],
+)
+def test_mistakes_of_sources(study_file, suboctave, old, new, text):
+    status, _, err = suboctave("check", study_file(BEAM.replace(old, new)))
+    assert status == 2
+    assert text in err

@@ -124,7 +124,7 @@ def plate(
         raise InputError(f"elements are two numbers, along x and y, not {shortened(elements)}", ("elements",))
     for count in elements:
         _check_count("elements", count)
-    clamped = (clamped,) if isinstance(clamped, str) else clamped
+    clamped = [clamped] if isinstance(clamped, str) or not isinstance(clamped, Sequence) else clamped
     for edge in clamped:
         if edge not in EDGES:
             raise InputError(f"there is no edge {shortened(edge)}{suggest(str(edge), EDGES)}", ("clamped",))

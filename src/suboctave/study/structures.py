@@ -4,13 +4,15 @@
 structure = "plate.npz"
 structure = { file = "plate.mat", mass = "MGG", fixed = ["node 1", "2 z"], damping = { rayleigh = [0.1, "beta"] } }
 structure = { mass = "M.mtx", stiffness = "K.mtx", dofs = "labels.txt" }
+structure = { source = "plate", length = 1.0, width = 0.6, thickness = 0.01, ..., elements = [20, 12] }
 elements = [{ type = "ElasticStop", dof = ["1042 z", "77 z"], stiffness = 1e5, gap = 0.1 }]
 loads = [{ type = "HarmonicLoad", direction = { "1042 z" = 1.0, "77 z" = -0.5 }, amplitude = 2.0 }]
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import inspect
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,14 +20,19 @@ from typing import Any
 from suboctave.errors import InputError, located, shortened, suggest
 from suboctave.structures.damping import ModalDamping, Rayleigh
 from suboctave.structures.files import read_structure
+from suboctave.structures.sources import beam, plate
 from suboctave.structures.structure import Structure
 
+#: what makes a structure without any file
+SOURCES: dict[str, Callable[..., Structure]] = {"beam": beam, "plate": plate}
 _KEYS = ("file", "mass", "stiffness", "damping", "dofs", "fixed")
 _DAMPINGS = ("rayleigh", "ratios", "modal")
 
 
 def given_structure(value: Any, folder: Path) -> Structure:
     """What a study file says of a structure: a file, or a table with the keys above; relative to `folder`.
+
+    `{ source = "beam" }` or "plate", with the arguments of these functions, needs no file.
 
     `damping` is the name of a matrix, a file, or one of the tables `{ rayleigh = [alpha, beta] }`,
     `{ ratios = [[omega1, zeta1], [omega2, zeta2]] }`, `{ modal = ratio or ratios }`. Raises InputError, with the key.
@@ -34,9 +41,11 @@ def given_structure(value: Any, folder: Path) -> Structure:
         return read_structure(folder / value)
     if not isinstance(value, Mapping):
         raise InputError(f"a structure is the name of a file, or a table, not {shortened(value)}")
+    if "source" in value:
+        return _from_source(dict(value))
     for key, item in value.items():
         if key not in _KEYS:
-            raise InputError(f"a structure has no key {key!r}{suggest(key, _KEYS)}", (key,))
+            raise InputError(f"a structure has no key {key!r}{suggest(key, [*_KEYS, 'source'])}", (key,))
         if key in ("file", "mass", "stiffness") and not isinstance(item, str):
             raise InputError(f"{key} is a text, not {shortened(item)}", (key,))
     given = dict(value)
@@ -56,9 +65,27 @@ def given_structure(value: Any, folder: Path) -> Structure:
         return structure.fixed(fixed) if fixed else structure
 
 
+def _from_source(given: dict[str, Any]) -> Structure:
+    source, fixed, damping = given.pop("source"), given.pop("fixed", ()), given.pop("damping", None)
+    if source not in list(SOURCES):
+        raise InputError(f"there is no source {shortened(source)}{suggest(str(source), SOURCES)}", ("source",))
+    known = inspect.signature(SOURCES[source]).parameters
+    for key in given:
+        if key not in known:
+            raise InputError(f"a {source} has no argument {key!r}{suggest(key, [*known, 'damping', 'fixed'])}", (key,))
+    if missing := [name for name, one in known.items() if one.default is one.empty and name not in given]:
+        raise InputError(f"a {source} needs {', '.join(missing)}")
+    structure = SOURCES[source](**given)
+    with located("damping"):
+        if damping is not None:
+            structure = structure.with_damping(_damping(damping))
+    with located("fixed"):
+        return structure.fixed(fixed) if fixed else structure
+
+
 def _damping(given: Mapping[str, Any]) -> Rayleigh | ModalDamping:
-    if len(given) != 1 or not set(given) <= set(_DAMPINGS):
-        wrong = next((key for key in given if key not in _DAMPINGS), "")
+    if not isinstance(given, Mapping) or len(given) != 1 or not set(given) <= set(_DAMPINGS):
+        wrong = next((key for key in (given if isinstance(given, Mapping) else ()) if key not in _DAMPINGS), "")
         raise InputError(f"damping is one of {', '.join(_DAMPINGS)}{suggest(wrong, _DAMPINGS) if wrong else ''}")
     (kind, value), *_ = given.items()
     if kind == "modal":
