@@ -22,12 +22,18 @@ def test_there_are_examples():
 LONG = ("ex21_damping_against_isolas", "ex22_regimes", "ex23_chaos")
 
 
+#: what some need beside the package: parts of the extra `fe`
+NEEDS = {"ex26_plate_with_stops": "skfem"}
+
+
 @pytest.mark.parametrize(
     "script",
     [pytest.param(path, marks=[pytest.mark.slow] if path.stem in LONG else []) for path in SCRIPTS],
     ids=lambda path: path.stem,
 )
 def test_example(script, tmp_path, monkeypatch):
+    if script.stem in NEEDS:
+        pytest.importorskip(NEEDS[script.stem])
     monkeypatch.setenv("MPLBACKEND", "Agg")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "argv", [str(script), "figure.png"])

@@ -14,6 +14,8 @@ from suboctave.study.cli import examples
 
 @pytest.mark.parametrize("name", sorted(examples()))
 def test_every_example_is_in_order(name, tmp_path, suboctave):
+    if name == "plate":
+        pytest.importorskip("skfem")
     path = tmp_path / "mine.toml"
     assert suboctave("new", path, "--example", name)[0] == 0
     if name == "matrices":
@@ -131,3 +133,27 @@ def test_published_structures_by_name(tmp_path, suboctave):
     assert status == 0, err
     path.write_text(path.read_text().replace("elements = 2", "elements = 2.5"))
     assert "elements=2.5" in suboctave("check", path)[2]
+
+
+def test_the_plate_is_the_published_one_in_other_units(tmp_path, suboctave):
+    """Lengths in 2 mm, masses in that of the plate, times in 1 / omega1: numbers of the file are rounded to 1 %."""
+    pytest.importorskip("skfem")
+    from suboctave.structures import clearance_plate
+    from suboctave.study.file import read_study
+
+    path = tmp_path / "mine.toml"
+    suboctave("new", path, "--example", "plate")
+    study = read_study(path)
+    system, unit = study.system, clearance_plate()
+    mass, damping, stiffness = system.matrices()
+    m, c, k = unit.matrices()
+    weight = 1.0 * 0.6 * 0.005 * 7850.0
+    np.testing.assert_allclose(mass, weight * m, atol=1e-9 * weight)
+    omega = float(np.sqrt(np.abs(stiffness).max() / (weight * np.abs(k).max())))
+    np.testing.assert_allclose(damping, weight * omega * c, atol=1e-2 * weight * omega * np.abs(c).max())
+    scales = {"Kc": weight * omega**2, "gap": 2e-3, "F": weight * omega**2 * 2e-3}
+    ours = {"Kc": unit.parameters["Kc"], "gap": unit.parameters["gap"], "F": unit.parameters["p"]}
+    for name, scale in scales.items():
+        assert system.parameters[name] == pytest.approx(ours[name] * scale, rel=0.03), name
+    assert study.steps[0].observe == int(np.argmax(unit.elements[0].direction(unit.n)))
+    assert system.observed_dof == unit.observed_dof
