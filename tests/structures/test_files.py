@@ -238,6 +238,11 @@ def test_what_is_missing_is_said(tmp_path, chain):
         so.read_structure()
     with pytest.raises(so.InputError, match="stiffness is missing"):
         so.read_structure(mass="m.mtx")
+    with pytest.raises(so.InputError, match=r"mass='m\.mtx' is a file, k\.mtx too: give one file, or one for each"):
+        so.read_structure("k.mtx", mass="m.mtx")
+    np.save(tmp_path / "k.npy", chain.stiffness)
+    with pytest.raises(so.InputError, match=r"k\.npy holds one matrix: give a file for each"):
+        so.read_structure(tmp_path / "k.npy")
     write_npz(tmp_path, chain)
     with pytest.raises(so.InputError, match=r"there is no file .*s\.npy.*did you mean 's\.npz'"):
         so.read_structure(tmp_path / "s.npy")

@@ -57,6 +57,16 @@ def test_output4(form, tmp_path, chain):
         assert "\n" not in str(caught.value)
 
 
+def test_output2_that_is_none(tmp_path, capfd):
+    pytest.importorskip("pyNastran.op4.op4")
+    for data in (b"certainly no matrix", bytes(200), b""):
+        (tmp_path / "job.op2").write_bytes(data)
+        with pytest.raises(so.InputError, match=r"job\.op2") as caught:
+            so.read_structure(tmp_path / "job.op2")
+        assert "\n" not in str(caught.value)
+    assert not capfd.readouterr().out
+
+
 def test_without_pynastran_the_message_says_what_to_install(tmp_path, monkeypatch):
     ordinary = builtins.__import__
 

@@ -299,6 +299,14 @@ def test_what_is_no_structure_is_refused(arguments, message):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize("kind", [scipy.sparse.csr_array, scipy.sparse.csc_matrix])
+def test_indices_outside_of_a_sparse_matrix_are_refused(kind):
+    matrix = kind(EYE)
+    matrix.indices = np.array([0, 1, 7], dtype=np.int32)
+    with pytest.raises(so.InputError, match="the stiffness is no sparse matrix: indices"):
+        so.Structure(EYE, matrix)
+
+
 def test_asymmetry_is_judged_in_any_units():
     """Rotations of a beam in millimetres are 1e6 times as stiff as displacements: rounding there is none here."""
     stiffness = np.array([[1.0, 1e3], [1e3 * (1 + 1e-12), 1e9]])

@@ -35,6 +35,7 @@ def square_matrix(given: Any, what: str, n: int | None = None) -> Any:
             "viscous damping as damping=",
             (what,),
         )
+    _check_places(given, what)
     matrix = scipy.sparse.csr_array(given, dtype=float, copy=True)
     if matrix.shape[0] != matrix.shape[1] or not matrix.shape[0]:
         raise InputError(f"the {what} must be square, not {matrix.shape[0]} x {matrix.shape[1]}", (what,))
@@ -49,6 +50,15 @@ def square_matrix(given: Any, what: str, n: int | None = None) -> Any:
     return matrix
 
 
+def _check_places(given: Any, what: str) -> None:
+    """Refuse compressed rows or columns with indices outside of the matrix, which would end the process in SciPy."""
+    if hasattr(given, "check_format"):
+        try:
+            given.check_format(full_check=True)
+        except ValueError as error:
+            raise InputError(f"the {what} is no sparse matrix: {error}", (what,)) from None
+
+
 def symmetric_matrix(matrix: Any, what: str, labels: DofMap | None) -> Any:
     """The matrix, exactly symmetric; InputError where it is not symmetric but for rounding."""
     difference = (matrix - matrix.T).tocoo()
@@ -57,7 +67,7 @@ def symmetric_matrix(matrix: Any, what: str, labels: DofMap | None) -> Any:
         return matrix
     scale = _scale(matrix)
     i, j = difference.coords
-    relative = off / np.sqrt(scale[i] * scale[j])
+    relative = off / np.sqrt(scale[i]) / np.sqrt(scale[j])
     worst = int(np.argmax(relative))
     if relative[worst] > _ASYMMETRY:
         row, column = sorted((int(i[worst]), int(j[worst])))

@@ -56,7 +56,9 @@ def matrix_of(matrices: Mapping[str, Any], what: str, name: str | None, file: st
         return matrices[candidates[0]]
     if what == "damping":
         return None
-    there = ", ".join(filter(None, sorted(matrices)[:12])) or "one matrix" if matrices else "none"
+    if set(matrices) == {""}:
+        raise InputError(f"{file} holds one matrix: give a file for each, mass= and stiffness=, and no other", (what,))
+    there = ", ".join(sorted(matrices)[:12]) or "none"
     raise InputError(f"{file} has no matrix named as a {what}, it has {there}; say which it is: {what}=", (what,))
 
 

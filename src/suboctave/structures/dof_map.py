@@ -132,7 +132,7 @@ class DofMap:
     def of_node(self, text: str) -> list[int]:
         """The degrees of freedom of a node, "node 1042" or "1042"; none where the text is not the name of one."""
         node = node_label(text)
-        return [i for i, (other, _) in enumerate(self.labels) if other == node] if node in self._nodes else []
+        return [self._places[node, direction] for direction in self._nodes.get(node, ())]
 
     def without(self, dofs: Sequence[int]) -> DofMap:
         """The map of what is left when these degrees of freedom are fixed."""

@@ -78,6 +78,11 @@ def read_structure(
         found = _one_each(files)
     else:
         first = path_of(path)
+        for what, value in in_files.items():
+            if Path(value).suffix.lower() in _READERS:
+                raise InputError(
+                    f"{what}={str(value)!r} is a file, {first.name} too: give one file, or one for each", (what,)
+                )
         files = abaqus.companions(first) if first.suffix.lower() in (".mtx", ".gz") and not in_files else {}
         if files:
             found = _one_each(files)

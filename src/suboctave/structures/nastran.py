@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +29,8 @@ def read_op4(path: Path) -> Contents:
     """All matrices of an .op4 file, text or binary."""
     with _py_nastran():
         from pyNastran.op4.op4 import OP4
-    matrices = OP4(debug=None).read_op4(str(path))
+    with redirect_stdout(StringIO()):  # what it prints of damaged files
+        matrices = OP4(debug=None).read_op4(str(path))
     if not matrices:
         raise InputError(f"{path.name} holds no matrix")
     return Contents({name: _whole(matrix) for name, matrix in matrices.items()})
@@ -39,7 +41,8 @@ def read_op2(path: Path) -> Contents:
     with _py_nastran():
         from pyNastran.op2.op2 import OP2
     model = OP2(debug=None)
-    model.read_op2(str(path), combine=False)
+    with redirect_stdout(StringIO()):
+        model.read_op2(str(path), combine=False)
     matrices = {name: _whole(matrix) for name, matrix in model.matrices.items() if not matrix.is_matpool}
     if not matrices:
         raise InputError(

@@ -29,7 +29,7 @@ def read_npz(path: Path) -> Contents:
     """All matrices of an .npz."""
     import scipy.sparse
 
-    with np.load(path, allow_pickle=False) as archive:
+    with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
         names = set(archive.files)
         if "format" in names:
             return Contents({"": scipy.sparse.csr_array(scipy.sparse.load_npz(path))})

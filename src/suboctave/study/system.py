@@ -268,6 +268,8 @@ def _loaded(path: Path, suffix: str, key: str | None) -> Any:
             matrix = scipy.sparse.load_npz(path) if is_sparse else archive[_chosen(path, key, archive.files)]
     elif suffix == ".mat":
         matrix = matrix[_chosen(path, key, [name for name in matrix if not name.startswith("__")])]
+    if hasattr(matrix, "check_format"):  # a damaged file may give indices outside of the matrix
+        matrix.check_format(full_check=True)
     return matrix.tocsr() if hasattr(matrix, "tocsr") else matrix
 
 
