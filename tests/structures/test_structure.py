@@ -156,6 +156,17 @@ def test_a_buckled_structure_is_said():
     assert "at rest is unstable" in str(found)
 
 
+def test_frequencies_that_lie_too_close_are_no_endless_search(monkeypatch):
+    """Masses on a stiff bed, hardly joined: the lowest of 20000 frequencies differ by 1e-11 of themselves."""
+    monkeypatch.setattr("suboctave.structures.frequencies._RESTARTS", 2)
+    n = 20000
+    joined = scipy.sparse.diags_array([-np.ones(n - 1), 2 * np.ones(n), -np.ones(n - 1)], offsets=[-1, 0, 1])
+    structure = so.Structure(scipy.sparse.eye_array(n), 1e3 * scipy.sparse.eye_array(n) + 1e-3 * joined)
+    with pytest.raises(so.ConvergenceError, match="may lie too close") as caught:
+        structure.frequencies(3)
+    assert "\n" not in str(caught.value)
+
+
 @pytest.mark.parametrize("count", [0, -1, 1.5, "a", True])
 def test_a_count_of_frequencies_is_a_whole_number(structure, count):
     with pytest.raises(so.InputError, match="how many natural frequencies"):
