@@ -17,9 +17,11 @@ one across which the orientation of the curve changes without a branch point: it
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+
+import numpy as np
 
 from suboctave.continuation.linear import length
 from suboctave.continuation.point import CurvePoint, between
@@ -29,6 +31,7 @@ from suboctave.curves.interior import FINEST, Interior, Steps, unsettled
 from suboctave.curves.sample import Sample
 from suboctave.curves.trace import Audit
 from suboctave.errors import ConvergenceError
+from suboctave.floquet.symmetric import relative_functions
 from suboctave.harmonic.basis import ComplexArray
 
 #: multipliers of modulus above one half may move by this much per interval (relative to their modulus above one)
@@ -214,8 +217,9 @@ class GuardedStep(Interior):
         self.refused = self.refused or (known is None and self.size > _JUMP)
         return known
 
-    def relative(self, sample: Sample) -> Array:
-        return sample.relative if self.turned is None else super().relative(sample)
+    def relative(self, stencil: Sequence[Sample]) -> Sequence[Array]:
+        known = () if self.turned else relative_functions([(s.floquet.multipliers, s.linear) for s in stencil])
+        return [np.column_stack((np.full(2, np.nan), one)) for one in known]
 
     def measures(self, sample: Sample) -> Array:
         """The tests at a sample, without their zeros at a branch point at which the curve turns back."""

@@ -19,8 +19,6 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 
-import numpy as np
-
 from suboctave.bifurcation.gaps import GapExtrema
 from suboctave.continuation.problem import Array
 from suboctave.curves.crossings import first_doubtful
@@ -137,11 +135,11 @@ class Interior(ABC):
     def measures(self, sample: Sample) -> Array:
         """Signs and logarithms of the moduli of functions smooth along the curve, shape (2, m)."""
 
-    def relative(self, sample: Sample) -> Array:
+    def relative(self, stencil: Sequence[Sample]) -> Sequence[Array]:
         """Functions with the same zeros as `measures` that are smoother where the linear structure has many
-        vibrations in a period, (2, m); NaN where there is none.
+        vibrations in a period, (2, m) at every sample, NaN where there is none; empty without any.
         """
-        return np.full_like(self.measures(sample), np.nan)
+        return ()
 
     @abstractmethod
     def solved(self, fraction: float) -> Sample | None:
@@ -196,8 +194,8 @@ class Interior(ABC):
         stencil, at = self._around(p, q)
         if len(stencil) < 3:
             return 0.5, "nothing was looked at"
-        others = [self.relative(s) for s in stencil]
-        doubt = first_doubtful([s.place for s in stencil], [self.measures(s) for s in stencil], at, others)
+        places, tests = [one.place for one in stencil], [self.measures(one) for one in stencil]
+        doubt = first_doubtful(places, tests, at, lambda: self.relative(stencil))
         return None if doubt is None else (doubt[1], self.reasons[doubt[0]])
 
     def _around(self, p: Sample, q: Sample) -> tuple[list[Sample], int]:

@@ -27,7 +27,7 @@ from suboctave.curves.motion import MotionEvaluation, MotionProblem
 from suboctave.curves.trace import BranchPoint
 from suboctave.floquet.methods import Monodromy, StabilityMethod
 from suboctave.floquet.result import FloquetResult
-from suboctave.floquet.symmetric import linear_multipliers, symmetric_functions
+from suboctave.floquet.symmetric import linear_multipliers
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.orbit import PeriodicOrbit
@@ -37,8 +37,6 @@ from suboctave.lazy import lazy
 _MONODROMY = Monodromy()
 #: excursions across a gap: instant and height of an extremum, and its second derivative by tau
 Excursions = list[tuple[float, float, float]]
-#: modulus of the multipliers of a linear structure up to which it counts as damped
-_DAMPED = 1.0 - 1e-9
 #: height, in units of the largest relative displacement, up to which an excursion may end soon
 _YOUNG = 0.05
 #: coefficient of a double multiplier, in units of omega, below which rounding has its say (an undamped structure)
@@ -150,18 +148,9 @@ class Sample:
         return measures.measured(point.tangent, point.weights, point.curve.parameter, self.floquet)
 
     @lazy
-    def relative(self) -> Array:
-        """The same but for `turn`, in units of what they are for the linear structure without elements; (2, 4).
-
-        Of many vibrations in a period each multiplier turns fast as the frequency changes, but most of them as those of
-        the linear structure do.
-        """
-        state, result = self.state, np.full((2, 4), np.nan)
-        linear = linear_multipliers(state.linear, 2.0 * math.pi / state.rate)
-        if np.abs(linear).max() < _DAMPED:
-            known, own = symmetric_functions(linear), self.floquet.symmetric
-            result[0, 1:], result[1, 1:] = own[0] * known[0], own[1] - known[1]
-        return result
+    def linear(self) -> ComplexArray:
+        """The multipliers of the linear structure without elements over the motion's period."""
+        return linear_multipliers(self.state.linear, 2.0 * math.pi / self.state.rate)
 
     # ---------------------------------------------------------------------------------- along curves of bifurcations
     @property

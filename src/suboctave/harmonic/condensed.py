@@ -35,7 +35,7 @@ from suboctave.model.system import System
 #: part of a direction that others do not hold, relative, below which it depends on them
 _DEPENDENT = 1e-9
 #: entries of a matrix relative to its diagonal that are rounding
-_ROUNDING = 1e-12
+_ROUNDING, _BESIDE = 1e-12, 1e-9
 #: growth of the highest frequency that a basis is made for, when motions go beyond it
 _BEYOND = 1.5
 
@@ -189,7 +189,8 @@ class Condensed:
         static = modes @ ((weight[:, None] * seen.T) @ held)
         # orthonormal vibrations that are not seen: the rest of an orthogonal matrix
         null = np.linalg.qr(seen.T, mode="complete")[0][:, self.size :]
-        _, turn = eigh((null * values[:, None]).T @ null) if null.shape[1] else (None, np.zeros((0, 0)))
+        squares, turn = eigh((null * values[:, None]).T @ null) if null.shape[1] else (np.zeros(0), np.zeros((0, 0)))
+        self._squares = squares
         return static, modes @ (null @ turn), held
 
     def _split(self, matrices: Array) -> list[tuple[Array, Array, Array, Array]]:
@@ -210,8 +211,8 @@ class Condensed:
         k = self._matrices[2]
         skew = self._split(0.5 * (k - k.T)[None])[0]
         # K = S - unit M, and S has no coupling
-        coupled = (held - self._unit * mass[0], -self._unit * mass[1], -self._unit * mass[2])
-        whole = (*coupled, self._split(0.5 * (k + k.T)[None])[0][3])
+        whole = (held - self._unit * mass[0], -self._unit * mass[1], -self._unit * mass[2], np.diag(self._squares))
+        mass = (*mass[:3], np.eye(len(self._squares)))
         stiffness = tuple(one + other for one, other in zip(whole, skew, strict=True))
         return Stack.of([mass, damping, stiffness])
 
@@ -316,7 +317,7 @@ class Condensed:
 def _is_diagonal(matrix: Array) -> bool:
     size = np.sqrt(np.abs(np.multiply.outer(matrix.diagonal(), matrix.diagonal())))
     beside = np.abs(matrix - np.diag(matrix.diagonal()))
-    return bool(np.all(beside <= _ROUNDING * np.maximum(size, np.abs(matrix).max() * _ROUNDING)))
+    return bool(np.all(beside <= _BESIDE * np.maximum(size, np.abs(matrix).max() * _ROUNDING)))
 
 
 def _derivative(matrix: MatrixCoefficient, names: tuple[str, ...], values: Mapping[str, float]) -> Array | None:
