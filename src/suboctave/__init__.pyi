@@ -57,6 +57,7 @@ from .harmonic import (
     HarmonicBasis as HarmonicBasis,
     PeriodicOrbit as PeriodicOrbit,
 )
+from .harmonic.condensed import condense as condense
 from .maps.isolas.map import IsolaMap as IsolaMap, isola_map as isola_map
 from .maps.isolas.result import Isola as Isola, Isolas as Isolas
 from .maps.isolas.search import find_isolas as find_isolas

@@ -17,6 +17,7 @@ the square of a modulus: the signs of determinants that bifurcations are told by
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -24,11 +25,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
-from suboctave.errors import InputError
+from suboctave.errors import InputError, shortened
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
 from suboctave.harmonic.reduction import Projected, Reduction
 from suboctave.lazy import lazy
+from suboctave.model.inputs import check_count, check_is_system, observed_dof
 from suboctave.model.matrices import MatrixCoefficient
 from suboctave.model.system import System
 
@@ -348,6 +350,32 @@ def linear_part_of(
     served = independent([*directions, *units])
     reduction = Reduction(system, directions, served, tuple(observed), frequency / 16.0 if scale is None else scale)
     return Condensed(reduction, reduction.covering(frequency, at), at)
+
+
+def condense(
+    system: System, omega: float | tuple[float, float], harmonics: int = 15, observe: int | Sequence[int] = ()
+) -> LinearPart:
+    """The linear part that verbs make by themselves, to look at before they work, or to share by `linear=`.
+
+    Printed, it says how many degrees of freedom, unknowns and modes there are, the first natural frequencies, and the
+    error of the flexibility.
+
+    Parameters
+    ----------
+    omega
+        Highest frequency of the load, or a range, rad per unit time.
+    harmonics
+        Highest multiple of it that motions will have; motions beyond find what they need.
+    observe
+        Degrees of freedom whose motion should be as exact as that at the forces.
+    """
+    check_is_system(system)
+    highest = float(np.max(omega))
+    if not (math.isfinite(highest) and highest > 0.0):
+        raise InputError(f"omega must be a positive frequency or a range of frequencies, not {shortened(omega)}")
+    observed = [observe] if isinstance(observe, int | np.integer) else list(observe)
+    chosen = [observed_dof(system, dof) for dof in observed] or [system.observed_dof]
+    return linear_part_of(system, None, (check_count("harmonics", harmonics) + 0.5) * highest, None, chosen)
 
 
 def acting(system: System) -> Array:
