@@ -1,14 +1,19 @@
 """Stability of a periodic motion from its monodromy matrix.
 
 The linearised motion `M y'' + (C + sum f_v d d^T) y' + (K + sum f_u d d^T) y = 0` is propagated over one period on
-panels that follow the laws (`time_mesh`, `propagate`), in modes of the linear part:
+panels that follow the laws (`time_mesh`, `propagate`), in modes of the linear part, or blocks of such (`blocks`):
 
     y'' + C y' + K y = - sum_g left_g (k_g q_g + c_g q_g' + r_g),    q_g = right_g^T y,
 
-r the force that the motion leaves unbalanced. All elements along one direction are one channel. An element with nodes
-of its own (`aft.general`), of force f(q, theta) along d_out, adds `d_out (f_ui d_i^T y + f_vi d_i^T y')` per input:
-one channel each, with its own direction to the left and to the right. Channels without force make panels follow what
-such a law follows (a corner in velocity, a sharp law in velocity), and give the time at the nodes.
+Blocks that are too fast for the motion follow the forces at once, like springs, and their multipliers are those of the
+free motion. That may move the others, by as much as contacts that set in later by the time such a block takes, and
+coupled neighbours by more: this bounds which blocks are meant, and belongs to the errors. Perturbations that decay
+while no channel acts need not be followed either: the period begins with the longest such time.
+
+Here r is the force that the motion leaves unbalanced. All elements along one direction are one channel. An element with
+nodes of its own (`aft.general`), of force f(q, theta) along d_out, adds `d_out (f_ui d_i^T y + f_vi d_i^T y')` per
+input: one channel each, with its own direction to the left and to the right. Channels without force make panels follow
+what such a law follows (a corner in velocity, a sharp law in velocity), and give the time at the nodes.
 
 Laws that their smoothness class is all of are evaluated in compiled code. All other elements give their tangents at all
 nodes at once, along the motion as it stands and, where it is corrected by `d(tau)`, again; but for sharp laws `f_u +
@@ -40,15 +45,9 @@ import scipy.linalg
 from scipy.linalg import lapack
 
 from suboctave.floquet.blocks import in_blocks
-from suboctave.floquet.propagate import (
-    ACCURACY,
-    march,
-    multipliers_and_shifts,
-    parts_needed,
-    periodic_start,
-    response,
-    structure,
-)
+from suboctave.floquet.exponentials import structure
+from suboctave.floquet.propagate import closed, march, multipliers_and_shifts, response
+from suboctave.floquet.resolution import ACCURACY, longest_rest, parts_needed
 from suboctave.floquet.result import FloquetResult
 from suboctave.floquet.time_mesh import (
     NODES,
@@ -73,6 +72,8 @@ from suboctave.interruption import check_time
 #: which does more; longest panels in units of the time scales of the forces, of the blocks as channels see them, and of
 #: the blocks; how much less these count if they are seen little, as a power: with them multipliers are good for 1e-8
 _LIMITS = (1e-4, 1e-2, 1.2, 1.8, 24.0, 1.0 / 12.0)
+#: logarithm of what is left of states that count no more: they need not be followed
+_FORGOTTEN = math.log(1e-14)
 #: most panels that a period is cut into for that
 _MOST = 20000
 #: nodes per period of a law of unknown smoothness, in units of panels of one radian; phase of a tangent over a panel
@@ -93,7 +94,7 @@ class _Linearised:
     Attributes
     ----------
     size
-        Number of states, 2 n.
+        Number of states that the period begins with: a motion that decays while no channel acts has none.
     spans
         dt/ds on every panel, (P, ORDER).
     path, law, base
@@ -102,8 +103,10 @@ class _Linearised:
         The channels with a force, (A,).
     coupled
         Whether any channel has stiffness or damping.
+    neglected, rounding
+        How far blocks without states may move multipliers, relative to the largest; see `blocks.Blocks`.
     before
-        Monodromy matrix along the motion as it stands, (2 n, 2 n).
+        Monodromy matrix along the motion as it stands, (size, size).
     """
 
     def __init__(self, state: BalanceState) -> None:
@@ -111,6 +114,7 @@ class _Linearised:
         self.state = state
         own = self._own = Channels(state)
         self._blocks = blocks = in_blocks(state.linear, balance.all_groups)
+        self.rounding = blocks.rounding
         self._laws = laws = PackedLaws(state.laws.groups, own.probes) if own.probes else state.packed
         self._motions, self._forces, self.active = state.motions, state.force_spectra, blocks.active
         if own.probes:
@@ -138,23 +142,34 @@ class _Linearised:
         while len(panels) < total <= _MOST:
             panels, start = split(panels, start, parts)
             parts, total = self._evaluated(panels)
+        rest = 0.0
+        if self._dynamic and blocks.decays[: self._dynamic].min() * 2.0 * math.pi < _FORGOTTEN * state.rate:
+            first, rest = longest_rest(self.spans, self.law, self.base, self.active, start)
+            panels, start = np.roll(panels, -first, axis=0), (start - first) % len(panels)
+            self._evaluated(panels)
         self.start, self.coupled = start, bool(self._held.any())
         own.locate(self.events, start, laws.owner, len(panels))
-        dynamic = self._dynamic
-        self.size = size = int(blocks.first[dynamic])
+        self._propagate(rest)
+
+    def _propagate(self, rest: float) -> None:
+        """Perturbations over the period along the motion as it stands, and where the periodic response begins; no
+        channel acts for a time `rest` at first.
+        """
+        blocks, dynamic, channels = self._blocks, self._dynamic, len(self.active)
+        self._kept = np.arange(blocks.first[dynamic])
+        if rest > 0.0:
+            lasting = blocks.decays[:dynamic] * rest >= _FORGOTTEN
+            self._kept = np.flatnonzero(np.repeat(lasting, np.diff(blocks.first[: dynamic + 1])))
+        self.size = size = len(self._kept)
         self._structures = structure(
             self.spans, blocks.motion, blocks.first, blocks.driven, blocks.read, blocks.coupling, blocks.flexible,
             dynamic,
         )  # fmt: skip
-        whole, channels = _identity(size, size + 1), len(self.active)
         self._acting = np.empty((len(self.spans), channels), dtype=bool)
         self._solved = np.empty((len(self.spans), channels * ORDER, size + 1))
-        self._march(self.law, np.zeros(self.base.shape), whole)
-        self.before = np.ascontiguousarray(whole[:, :size])
-        self._start = None
-        if size and len(self.active):
-            self._start = np.empty((size, 1))
-            periodic_start(whole, self._start)
+        self._whole = self._march(self.law, np.zeros(self.base.shape), size + 1)
+        self.before, self._start = np.empty((size, size)), np.empty((size, 1))
+        closed(self._whole, self._kept, self.before, self._start)
 
     def _evaluated(self, panels: Array) -> tuple[np.ndarray, float]:
         """Evaluate all laws on panels; how many parts each of these needs, (P,), and how many panels that makes."""
@@ -176,13 +191,16 @@ class _Linearised:
         )  # fmt: skip
         return parts, total
 
-    def _march(self, law: Array, kick: Array, total: Array) -> None:
-        """See `propagate.march`."""
+    def _march(self, law: Array, kick: Array, columns: int) -> Array:
+        """States at the end of the period, (S, columns); see `propagate.march`."""
         blocks = self._blocks
+        total = np.zeros((blocks.first[self._dynamic], columns))
+        total[self._kept, np.arange(self.size)] = 1.0
         march(
-            self._structures, blocks.first, blocks.driven, law, self.base, kick, self.active, total, self._acting,
-            self._solved,
+            self._structures, blocks.first, blocks.driven, law, self.base, kick, self.active, total, self.size,
+            self._acting, self._solved,
         )  # fmt: skip
+        return total
 
     def _changed(self, change: Array) -> tuple[Array, Array]:
         """Along the motion changed by (G, 2, N): no force, stiffness and damping (G, 3, N), kicks at the beginnings of
@@ -197,21 +215,22 @@ class _Linearised:
         self._own.changed(self.path, change, law, self.spans)
         return law, kick
 
-    def fast(self) -> tuple[ComplexArray, Array]:
-        """Multipliers of the blocks without states, as if no channel acted, and how far those may move them."""
-        blocks, dynamic = self._blocks, self._dynamic
+    def others(self) -> tuple[ComplexArray, Array]:
+        """Multipliers of what has no states at the beginning, as if no channel acted, and how far those may move
+        them.
+        """
+        blocks = self._blocks
         if self.size == len(blocks.exponents):
             return _NO_MULTIPLIERS
-        time = 2.0 * math.pi / self.state.rate
-        exponents = blocks.exponents[self.size :] * time
-        mu = np.exp(exponents)
-        moved = 1e-15 * np.abs(exponents)
-        if blocks.coupled > dynamic:
-            flexible, rates = np.abs(blocks.flexibility[dynamic:]).sum(axis=2), blocks.rates[dynamic:]
-            by_stiffness, by_damping = (flexible @ held for held in self._held)
-            by_forces = rates * (by_stiffness + rates * by_damping)
-            moved += np.repeat(np.expm1(np.minimum(2.0 * by_forces, 1.0)), np.diff(blocks.first[dynamic:]))
-        return mu, np.abs(mu) * moved + 1e-14
+        without = np.ones(len(blocks.exponents), dtype=bool)
+        without[self._kept] = False
+        exponents = blocks.exponents[without] * (2.0 * math.pi / self.state.rate)
+        mu, flexible = np.exp(exponents), np.abs(blocks.flexibility).sum(axis=2)
+        by_stiffness, by_damping = (flexible @ held for held in self._held)
+        by_forces = 2.0 * blocks.rates * (by_stiffness + blocks.rates * by_damping)
+        moved = np.repeat(np.expm1(np.minimum(by_forces, 1.0)), np.diff(blocks.first))[without]
+        moved += 1e-15 * np.abs(exponents) + blocks.rounding
+        return mu, np.abs(mu) * moved + math.exp(_FORGOTTEN)
 
     def multipliers(self, weight: float) -> tuple[ComplexArray, Array, float]:
         """Multipliers, how far the correction has moved them, and the share of it that was taken.
@@ -220,27 +239,19 @@ class _Linearised:
         """
         share, start = 1.0, self._start
         change = np.zeros_like(self.path)
-        if start is not None:
+        if len(self.active):
             if weight < 1.0:
                 start = start - (1.0 - weight) * (projector(self.before) @ start)
             share = response(
-                self._structures, self._blocks.first, self.active, self._acting, self._solved, start, self.path,
-                _LARGEST, change,
+                self._structures, self._blocks.first, self.active, self._acting, self._solved, start, self._whole,
+                self._kept, self.path, _LARGEST, change,
             )  # fmt: skip
-        after = _identity(self.size, self.size)
         law, kick = self._changed(change)
-        self._march(law, kick, after)
+        after = self._march(law, kick, self.size)[self._kept]
         mu, shift = np.empty(self.size, dtype=complex), np.empty(self.size)
         real, imaginary, left, right, _ = lapack.dgeev(after, 1, 1)
         multipliers_and_shifts(real, imaginary, left, right, after, self.before, mu, shift)
         return mu, shift, share
-
-
-def _identity(rows: int, columns: int) -> Array:
-    """Ones on the diagonal: a few times quicker than `np.eye`."""
-    out = np.zeros((rows, columns))
-    out.ravel()[: rows * columns : columns + 1] = 1.0
-    return out
 
 
 class Channels:
@@ -441,7 +452,7 @@ def floquet_multipliers(state: BalanceState) -> FloquetResult:
     """Multipliers, error estimates and verdict of a solved motion, over the motion's own period (`nu` load periods)."""
     check_time()
     motion = _Linearised(state)
-    mu, errors = motion.fast()
+    mu, errors = motion.others()
     if not np.isfinite(motion.before).all():
         return _no_numbers(state, motion.size + len(mu))
     if motion.size:
@@ -467,7 +478,7 @@ def _with_states(motion: _Linearised) -> tuple[ComplexArray, Array]:
         mu, shift, share = _beside_fold(motion, moved, shift)
     # where the correction had to be cut, the motion is not near enough to a true one to say much
     cut = 1.0 / share - 1.0 if share > 0.0 else math.inf
-    least = (ACCURACY if motion.coupled else 0.0) + motion.neglected + cut
+    least = (ACCURACY if motion.coupled else 0.0) + motion.rounding + motion.neglected + cut
     return mu, shift * (1.0 + cut) + least * largest
 
 

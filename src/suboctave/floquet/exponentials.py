@@ -1,0 +1,160 @@
+"""What blocks of the linear part make of initial states and of forces on a panel, exactly.
+
+See `propagate` for the formulas: exponentials of blocks in closed form, and their integrals with Lagrange's polynomials
+by Gauss's formula between neighbouring nodes, which holds on panels of any mapping.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from suboctave.compiled import kernel
+from suboctave.floquet.time_mesh import NODES, ORDER
+
+#: sums may be reordered; infinities keep their meaning
+_FAST = {"reassoc", "contract", "nsz"}
+#: points of Gauss's formula between neighbouring nodes
+_POINTS = 8
+
+
+def _between() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """For Gauss's points between every two neighbouring nodes, from values at the nodes: values there, integrals from
+    there to the right node, (m - 1, points, m) each, and over the whole interval, (m - 1, m); the weights.
+    """
+    x, w = np.polynomial.legendre.leggauss(_POINTS)
+    left, right = NODES[:-1, None], NODES[1:, None]
+    points = 0.5 * (left + right) + 0.5 * (right - left) * x
+    inverse = np.linalg.inv(np.polynomial.legendre.legvander(NODES, ORDER - 1))
+    integral = np.array([np.polynomial.legendre.legint(row) for row in np.eye(ORDER)])
+    over = np.polynomial.legendre.legvander(NODES, ORDER) @ integral.T @ inverse
+    until = over[1:, None, :] - np.polynomial.legendre.legvander(points, ORDER) @ integral.T @ inverse
+    values = np.polynomial.legendre.legvander(points, ORDER - 1) @ inverse
+    return np.ascontiguousarray(values), np.ascontiguousarray(until), over[1:] - over[:-1], 0.5 * (right - left) * w
+
+
+_VALUES, _UNTIL, _WHOLE, _WEIGHTS = _between()
+
+
+@kernel(fastmath=_FAST, error_model="numpy")
+def exponential(mean, square, t):
+    """e_0, e_1 with `exp(L t) = e_0 + e_1 L` for a matrix whose eigenvalues are `mean +- sqrt(square)`."""
+    if square < 0.0:
+        turn = math.sqrt(-square)
+        size = math.exp(mean * t)
+        odd = size * (math.sin(turn * t) / turn if turn * t > 1e-6 else t)
+        return size * math.cos(turn * t) - mean * odd, odd
+    root = math.sqrt(square)
+    low, high = math.exp((mean - root) * t), math.exp((mean + root) * t)
+    odd = 0.5 * (high - low) / root if root * t > 1e-3 else low * t * (1.0 + root * t * (1.0 + root * t * (2.0 / 3.0)))
+    return 0.5 * (low + high) - mean * odd, odd
+
+
+@kernel(fastmath=_FAST, error_model="numpy")
+def _integrals(times, left, rate, mean, square, e, w):
+    """e_0, e_1 at the nodes into e (2, m), and w_0, w_1 into w (2, m m), on one panel; mean, square: see `exponential`.
+
+    times (m - 1,): between the nodes; left, rate (m - 1, points): time from Gauss's points to the next node, and dt/ds
+    there times their weight.
+    """
+    m = ORDER
+    e[0, 0], e[1, 0] = 1.0, 0.0
+    for l in range(m):
+        w[0, l] = w[1, l] = 0.0
+    trace, minus = 2.0 * mean, square - mean * mean
+    for i in range(m - 1):
+        old, new = i * m, (i + 1) * m
+        x, y = exponential(mean, square, times[i])
+        # (x + y L) (u + v L) with L^2 = trace L + minus
+        e[0, i + 1] = x * e[0, i] + minus * y * e[1, i]
+        e[1, i + 1] = x * e[1, i] + y * e[0, i] + trace * y * e[1, i]
+        for l in range(m):
+            w[0, new + l] = x * w[0, old + l] + minus * y * w[1, old + l]
+            w[1, new + l] = x * w[1, old + l] + y * w[0, old + l] + trace * y * w[1, old + l]
+        for g in range(_POINTS):
+            x, y = exponential(mean, square, left[i, g])
+            x *= rate[i, g]
+            y *= rate[i, g]
+            for l in range(m):
+                w[0, new + l] += x * _VALUES[i, g, l]
+                w[1, new + l] += y * _VALUES[i, g, l]
+
+
+@kernel(fastmath=_FAST, error_model="numpy")
+def structure(spans, motion, first, driven, read, coupling, flexible, dynamic):
+    """What the first `dynamic` blocks make of initial states and forces on panels with dt/ds = spans (P, m).
+
+    motion, first, driven, read, coupling, flexible: see `blocks.Blocks`; S: states of these blocks. Returns which kind
+    each panel is, (P,), a panel like the one before being of the same kind, and for each kind
+
+    - moved (D, blocks, 2, 2): exp(L t) over the panel
+    - reading (D, 2, G m, S): q and q' at the nodes from initial states
+    - influence (D, 2, G m, G m): the same from forces at the nodes
+    - entering (D, S, G m): final states from forces at the nodes.
+    """
+    kinds = np.zeros(spans.shape[0], dtype=np.int64)
+    for p in range(1, spans.shape[0]):
+        kinds[p] = kinds[p - 1]
+        for j in range(spans.shape[1]):
+            if abs(spans[p, j] - spans[p - 1, j]) > 1e-12 * spans[p, j]:
+                kinds[p] = kinds[p - 1] + 1
+                break
+    groups, m, size = driven.shape[1], ORDER, first[dynamic]
+    count = kinds[-1] + 1
+    moved, reading = np.zeros((count, dynamic, 2, 2)), np.empty((count, 2, groups * m, size))
+    influence, entering = np.empty((count, 2, groups * m, groups * m)), np.empty((count, size, groups * m))
+    times, left, rate = np.empty(m - 1), np.empty((m - 1, _POINTS)), np.empty((m - 1, _POINTS))
+    e, w, sums = np.empty((2, m)), np.empty((2, m * m)), np.empty((2 * groups * groups, m * m))
+    turned = np.empty(2)
+    for p in range(spans.shape[0]):
+        d = kinds[p]
+        if p > 0 and d == kinds[p - 1]:
+            continue
+        for i in range(m - 1):
+            times[i] = 0.0
+            for l in range(m):
+                times[i] += _WHOLE[i, l] * spans[p, l]
+            for g in range(_POINTS):
+                left[i, g] = rate[i, g] = 0.0
+                for l in range(m):
+                    left[i, g] += _UNTIL[i, g, l] * spans[p, l]
+                    rate[i, g] += _VALUES[i, g, l] * spans[p, l] * _WEIGHTS[i, g]
+        for i in range(sums.shape[0]):
+            for l in range(m * m):
+                sums[i, l] = 0.0
+        for b in range(dynamic):
+            s, wide = first[b], first[b + 1] - first[b]
+            mean = 0.5 * (motion[b, 0, 0] + motion[b, 1, 1])
+            half = 0.5 * (motion[b, 0, 0] - motion[b, 1, 1])
+            _integrals(times, left, rate, mean, half * half + motion[b, 0, 1] * motion[b, 1, 0], e, w)
+            for i in range(sums.shape[0]):
+                once, twice = coupling[b, 0, i], coupling[b, 1, i]
+                for l in range(m * m):
+                    sums[i, l] += once * w[0, l] + twice * w[1, l]
+            for i in range(wide):
+                for k in range(wide):
+                    moved[d, b, i, k] = e[1, m - 1] * motion[b, i, k] + (e[0, m - 1] if i == k else 0.0)
+                for g in range(groups):
+                    turned[0] = turned[1] = 0.0
+                    for k in range(wide):
+                        turned[0] += motion[b, i, k] * driven[s + k, g]
+                    for j in range(m):
+                        l = (m - 1) * m + j
+                        entering[d, s + i, g * m + j] = w[0, l] * driven[s + i, g] + w[1, l] * turned[0]
+                    for part in range(2):
+                        turned[1] = 0.0
+                        for k in range(wide):
+                            turned[1] += read[part, g, s + k] * motion[b, k, i]
+                        for j in range(m):
+                            reading[d, part, g * m + j, s + i] = e[0, j] * read[part, g, s + i] + e[1, j] * turned[1]
+        for part in range(2):
+            for g in range(groups):
+                for h in range(groups):
+                    for j in range(m):
+                        for l in range(m):
+                            value = sums[(part * groups + g) * groups + h, j * m + l]
+                            influence[d, part, g * m + j, h * m + l] = value
+                        if part == 0:
+                            influence[d, 0, g * m + j, h * m + j] += flexible[dynamic, g, h]
+    return kinds, moved, reading, influence, entering

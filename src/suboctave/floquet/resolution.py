@@ -1,0 +1,148 @@
+"""What of a structure needs states along a motion, and how finely the period is cut.
+
+Panels follow the forces: stiffness and damping of the channels, and blocks as far as channels see them. Blocks that are
+too fast have no states, and follow the forces like springs; how far that may move multipliers decides which these are.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from suboctave.compiled import kernel
+from suboctave.floquet.time_mesh import WEIGHTS
+
+_TINY = float(np.finfo(float).tiny)
+#: what panels are made for: errors of multipliers, and share of what blocks without states may move them
+ACCURACY, _FINER = 1e-8, 0.01
+#: impulses in a period that blocks without states may miss
+_CHANGES = 4.0
+
+
+@kernel()
+def longest_rest(spans, law, base, active, start):
+    """The first of the panels in a row on which no channel has stiffness or damping and none begins with an event, and
+    how long it takes to pass them: the longest such row.
+
+    spans, law, base, active: see `parts_needed`; start: the panels that begin with events.
+    """
+    panels, m = spans.shape
+    busy, best, at, time, first = np.zeros(panels, dtype=np.bool_), 0.0, 0, 0.0, 0
+    for p in start:
+        busy[p] = True
+    for p in range(panels):
+        for channel in active:
+            for j in range(p * (m - 1), p * (m - 1) + m):
+                busy[p] = busy[p] or law[channel, 1, j] + base[channel, p] != 0.0 or law[channel, 2, j] != 0.0
+    for turn in range(2 * panels):
+        p = turn % panels
+        if busy[p]:
+            time, first = 0.0, turn + 1
+            continue
+        for j in range(m):
+            time += WEIGHTS[j] * spans[p, j]
+        if time > best and turn - first < panels:
+            best, at = time, first % panels
+    return at, best
+
+
+@kernel()
+def with_states(most, held, rates, decays, flexibility, reach, first, coupled, resolved, time, tolerable):
+    """How many blocks have states, and how far the others may move multipliers, relative to the largest.
+
+    A block without states follows a force F that sets in at once, and not with a delay of 1/rate: what that makes is an
+    impulse `F / rate` of its share in the force, k R k q / rate, whenever a contact begins or ends. Two neighbours, one
+    with states and one without, are coupled by forces besides, and the closer they lie the more that does.
+
+    most, held (2, G): largest stiffness and damping of channels, and integrals over the period, which takes `time`;
+    rates, ...: see `blocks.Blocks`; reach (S + 1, G): how far an impulse moves a channel; resolved: a rate up to which
+    all blocks have states; tolerable: how far the others may move multipliers.
+    """
+    groups = most.shape[1]
+    dynamic, neglected, last = coupled, 0.0, 0.0
+    impulse, shifts = np.zeros(groups), np.zeros(2)
+    for b in range(coupled - 1, -1, -1):
+        if not rates[b] > resolved:
+            break
+        much = 0.0
+        for g in range(groups):
+            for h in range(groups):
+                both = (most[0, g] + most[1, g] * rates[b]) * (most[0, h] + most[1, h] * rates[b])
+                impulse[g] += both * abs(flexibility[b, g, h]) / rates[b]
+            much += _CHANGES * impulse[g] * reach[first[b], g]
+        if not much <= tolerable:
+            break
+        between = 0.0
+        if b > 0:
+            for i in range(2):
+                shifts[i] = 0.0
+                for g in range(groups):
+                    change = rates[b - i] * (held[0, g] + rates[b - i] * held[1, g])
+                    shifts[i] += change * abs(flexibility[b - i, g, g])
+            apart = (rates[b] - rates[b - 1]) * time
+            between = math.exp(min(0.0, decays[b] * time)) * shifts[0] * shifts[1] / max(apart, 1e-3 * shifts[0], _TINY)
+        if much + between <= tolerable:
+            dynamic, neglected, last = b, much, between
+    return dynamic, neglected + last
+
+
+@kernel()
+def parts_needed(
+    spans, forces, law, base, active, most, held, rates, decays, flexibility, share, first, coupled, resolved, limits
+):  # fmt: skip
+    """Into how many parts panels with dt/ds = spans (P, m) have to be cut, (P,), how many there are then, a float, and
+    what `with_states` says.
+
+    forces (C, .): Fourier coefficients of all channels; law, base, active: see `march`; rates, ..., resolved: see
+    `with_states`. limits: how far blocks without states may move multipliers, and how much further where the motion
+    leaves all of a force unbalanced; lengths of parts in units of the fastest time scale of the forces, of that of the
+    blocks as channels see them, and of that of the blocks; the power of the share of a block in a force with which it
+    counts for the second. Into most, held (2, G): see `with_states`; most has what channels can have elsewhere.
+    """
+    panels, m = spans.shape
+    groups = active.shape[0]
+    k, c, lengths, time = np.zeros((groups, panels)), np.zeros((groups, panels)), np.zeros(panels), 0.0
+    for p in range(panels):
+        for j in range(m):
+            lengths[p] += WEIGHTS[j] * spans[p, j]
+        time += lengths[p]
+    left, whole = 0.0, _TINY
+    for g in range(groups):
+        channel, size = active[g], 0.0
+        held[0, g] = held[1, g] = 0.0
+        for p in range(panels):
+            for j in range(p * (m - 1), p * (m - 1) + m):
+                k[g, p] = max(k[g, p], abs(law[channel, 1, j] + base[channel, p]))
+                c[g, p] = max(c[g, p], abs(law[channel, 2, j]))
+                left = max(left, abs(law[channel, 0, j]))
+            most[0, g], most[1, g] = max(most[0, g], k[g, p]), max(most[1, g], c[g, p])
+            held[0, g] += k[g, p] * lengths[p]
+            held[1, g] += c[g, p] * lengths[p]
+        for h in range(forces.shape[1]):
+            size += abs(forces[channel, h])
+        whole = max(whole, size)
+    tolerable = limits[0] + limits[1] * min(1.0, left / whole)
+    dynamic, neglected = with_states(
+        most, held, rates, decays, flexibility, share[0], first, coupled, resolved, time, tolerable
+    )
+    fastest = rates[dynamic - 1] if dynamic > 0 else 0.0
+    # panels need not be much better than that
+    seeing = limits[3] * max(1.0, _FINER * neglected / ACCURACY) ** 0.1
+    parts, total = np.ones(panels, dtype=np.int64), 0.0
+    for p in range(panels):
+        a = rate = sight = 0.0
+        for g in range(groups):
+            a += share[1, first[dynamic], g] * k[g, p]
+            rate += share[1, first[dynamic], g] * c[g, p]
+        for b in range(dynamic):
+            seen = 0.0
+            for g in range(groups):
+                seen += (k[g, p] + c[g, p] * rates[b]) * abs(flexibility[b, g, g])
+            if seen > 0.0:
+                sight = max(sight, rates[b] * min(1.0, seen) ** limits[5])
+        wanted = math.ceil(lengths[p] * max((math.sqrt(a) + rate) / limits[2] + sight / seeing, fastest / limits[4]))
+        total += wanted
+        # no more than a number of parts: beyond a million nothing is cut
+        parts[p] = int(min(wanted, 1e6)) if wanted >= 1.0 else 1
+    return parts, total, dynamic, neglected

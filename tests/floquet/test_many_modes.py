@@ -1,0 +1,169 @@
+"""Structures of many modes, most of them far too fast for the harmonics: multipliers against exact exponentials.
+
+Along a motion through stops the linearised motion has constant matrices between the instants of contact: its monodromy
+matrix is a product of exponentials of all modes, whatever their frequencies are.
+"""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.linalg import expm
+from scipy.optimize import brentq, linear_sum_assignment
+
+import suboctave as so
+from suboctave.floquet import monodromy
+from suboctave.floquet.monodromy import floquet_multipliers
+from suboctave.harmonic import HarmonicBalance, HarmonicBasis
+
+STIFFNESS, GAPS = 10.0, (0.5, 0.6)
+
+
+def damping_of(kind, frequencies, rng):
+    if kind == "stiffness-proportional":  # fast modes are overdamped
+        return np.diag(0.01 * (1.0 + frequencies**2))
+    damping = np.diag(0.03 * frequencies)
+    if kind == "full":
+        damping += sum(0.02 * np.outer(d, d) for d in rng.normal(size=(3, len(frequencies))))
+    return damping
+
+
+def structure(n, top, channels, kind, seed, element=None):
+    """Modes of frequencies from 1 to `top`, channels that see all of them, and the directions of these."""
+    rng = np.random.default_rng(seed)
+    frequencies = np.geomspace(1.0, top, n)
+    directions = rng.uniform(0.4, 1.0, (channels, n)) * rng.choice([-1.0, 1.0], (channels, n))
+    directions[:, 0] = 1.0
+    pairs = zip(directions, GAPS, strict=False)
+    elements = [element(d) if element else so.ElasticStop(None, STIFFNESS, gap, direction=d) for d, gap in pairs]
+    load = so.HarmonicLoad(direction=np.eye(n)[0], amplitude=1.0)
+    system = so.System(np.eye(n), damping_of(kind, frequencies, rng), np.diag(frequencies**2), elements, [load])
+    return system, directions
+
+
+def motion_of(system, harmonics, omega, seed):
+    """A motion that is given, not solved for: a few harmonics of the slow modes."""
+    x = np.zeros((2 * harmonics + 1, system.n))
+    x[1, 0], x[4, 0] = 1.3, 0.2
+    x[:5, :3] += 0.1 * np.random.default_rng(seed).normal(size=(5, 3))
+    return HarmonicBalance(system, HarmonicBasis(harmonics)).at(x, omega)
+
+
+def displacement(state, direction, tau):
+    c, k = state.x @ direction, np.arange(1, state.basis.harmonics + 1)
+    return c[0] + np.cos(tau * k) @ c[1::2] + np.sin(tau * k) @ c[2::2]
+
+
+def exact(system, directions, state):
+    """The product of exponentials between the instants at which contacts begin and end."""
+    _, damping, stiffness = system.matrices()
+    zero, one = np.zeros_like(stiffness), np.eye(system.n)
+    grid, instants = np.linspace(0.0, 2.0 * np.pi, 2001), []
+    for d, gap in zip(directions, GAPS, strict=False):
+
+        def beyond(tau, d=d, gap=gap):
+            return displacement(state, d, tau) - gap
+
+        for i in np.flatnonzero(np.diff(np.sign([beyond(tau) for tau in grid]))):
+            instants.append(brentq(beyond, grid[i], grid[i + 1], xtol=1e-15))
+    assert instants
+    instants.sort()
+    result = np.eye(2 * system.n)
+    for a, b in zip(instants, [*instants[1:], instants[0] + 2.0 * np.pi], strict=True):
+        k = stiffness.copy()
+        for d, gap in zip(directions, GAPS, strict=False):
+            if displacement(state, d, 0.5 * (a + b)) > gap:
+                k += STIFFNESS * np.outer(d, d)
+        result = expm(np.block([[zero, one], [-k, -damping]]) * (b - a) / state.rate) @ result
+    return np.linalg.eigvals(result)
+
+
+def differences(mu, errors, expected):
+    """Distances of multipliers that belong together, with the stated errors; those that have decayed aside."""
+    apart = np.abs(mu[:, None] - expected)
+    i, j = linear_sum_assignment(apart)
+    alive = np.abs(expected[j]) > 1e-3
+    return apart[i, j][alive], errors[i][alive]
+
+
+def before(state):
+    """Multipliers along the motion as it stands, with the errors of propagation alone."""
+    motion = monodromy._Linearised(state)
+    mu, errors = motion.others()
+    own = np.linalg.eigvals(motion.before)
+    least = (1e-8 + motion.neglected) * max(1.0, np.abs(own).max(initial=0.0))
+    return motion, np.concatenate((own, mu)), np.concatenate((np.full(len(own), least), errors))
+
+
+@pytest.mark.parametrize("kind", ["stiffness-proportional", "modal", "full"])
+@pytest.mark.parametrize("channels", [1, 2])
+def test_fast_modes(kind, channels):
+    """Few states are left of twice fourteen, and the stated errors cover what that does."""
+    for seed in range(4):
+        system, directions = structure(14, 3e3, channels, kind, seed)
+        state = motion_of(system, 9, 1.1, seed)
+        motion, mu, errors = before(state)
+        assert motion.size <= 20
+        assert len(motion.spans) < 150
+        difference, stated = differences(mu, errors, exact(system, directions, state))
+        assert len(difference) >= 4
+        assert np.all(difference <= stated)
+        assert np.all(difference < 2e-4)
+
+
+@pytest.mark.parametrize("kind", ["stiffness-proportional", "modal", "full"])
+def test_all_modes_with_states(kind, monkeypatch):
+    """Where nothing may be neglected everything is good for the panels' 1e-8, with far fewer of them than vibrations of
+    the fastest mode.
+    """
+    monkeypatch.setattr(monodromy, "_LIMITS", (0.0, 0.0, *monodromy._LIMITS[2:]))
+    for seed in range(2):
+        system, directions = structure(7, 120.0, 2, kind, seed)
+        state = motion_of(system, 9, 1.1, seed)
+        motion, mu, errors = before(state)
+        assert motion.neglected == 0.0
+        difference, _ = differences(mu, errors, exact(system, directions, state))
+        assert difference.max() < 1e-8
+
+
+@pytest.mark.parametrize("kind", ["modal", "full"])
+def test_fast_modes_of_a_smooth_force(kind):
+    """Along a cubic spring, against a general-purpose integrator for all modes: the fast ones' flexibility in series
+    with the spring tells all about them but their inertia.
+    """
+    system, (d,) = structure(6, 60.0, 1, kind, 0, lambda d: so.CubicSpring(direction=d, coefficient=0.3))
+    state = motion_of(system, 9, 1.1, 0)
+    motion, mu, errors = before(state)
+    assert motion.size < 12
+    _, damping, stiffness = system.matrices()
+
+    def field(t, y):
+        u, v = y.reshape(2, 6, 12)
+        q = displacement(state, d, state.rate * t)
+        return np.concatenate((v, -stiffness @ u - damping @ v - 0.9 * q**2 * np.outer(d, d @ u))).ravel()
+
+    period = 2.0 * np.pi / state.rate
+    solution = solve_ivp(field, (0.0, period), np.eye(12).ravel(), method="DOP853", rtol=1e-9, atol=1e-11)
+    expected = np.linalg.eigvals(solution.y[:, -1].reshape(12, 12))
+    difference, stated = differences(mu, errors, expected)
+    assert np.all(difference <= stated)
+    result = floquet_multipliers(state)
+    assert len(result.multipliers) == 12
+    assert np.all(np.diff(np.abs(result.multipliers)) <= 1e-12)
+
+
+def test_modes_that_no_channel_sees():
+    """They are free, whatever the others do: multipliers to rounding."""
+    system, _ = structure(6, 40.0, 1, "modal", 0)
+    hidden = np.array([[1.0, 0.7, 0.0, 0.5, 0.0, 0.6]])
+    system = so.System(
+        np.eye(6), system.matrices()[1], system.matrices()[2],
+        [so.ElasticStop(direction=hidden[0], stiffness=STIFFNESS, gap=GAPS[0])], [so.HarmonicLoad(0, 1.0)],
+    )  # fmt: skip
+    state = motion_of(system, 9, 1.1, 0)
+    result = floquet_multipliers(state)
+    for i in (2, 4):
+        c, k = system.matrices()[1][i, i], system.matrices()[2][i, i]
+        for root in np.roots([1.0, c, k]):
+            at = np.abs(result.multipliers - np.exp(root * 2.0 * np.pi / 1.1)).argmin()
+            assert abs(result.multipliers[at] - np.exp(root * 2.0 * np.pi / 1.1)) < 1e-13
+            assert result.errors[at] < 1e-12
