@@ -46,6 +46,8 @@ class Blocks(NamedTuple):
         Largest |lambda| of every block, (B,).
     decays
         Largest real part of the eigenvalues of every block, (B,).
+    steepest
+        The least of these among the blocks before each, (B + 1,), as numbers.
     exponents
         All eigenvalues, in the order of the states, (S,).
     driven
@@ -73,6 +75,7 @@ class Blocks(NamedTuple):
     first: np.ndarray
     rates: Array
     decays: Array
+    steepest: list[float]
     exponents: ComplexArray
     driven: Array
     read: Array
@@ -220,11 +223,11 @@ def _arranged(parts: _Parts, n: int, left: Array, right: Array, active: np.ndarr
     for b, i in enumerate(order):
         coupling[b, 0], coupling[b, 1] = read[i] @ driven[i], read[i] @ parts.matrices[i] @ driven[i]
     decays = np.array([parts.exponents[i].real.max() for i in order])
+    steepest = [0.0, *np.minimum.accumulate(decays).tolist()]
     exponents = np.concatenate([parts.exponents[i] for i in order])
     flexible = np.zeros((len(order) + 1, groups, groups))
     flexible[:-1] = flexibility[::-1].cumsum(axis=0)[::-1]
     return Blocks(
-        motion, first, rates[order], decays, exponents, into, np.ascontiguousarray(out), flexibility, flexible,
-        coupling.reshape(len(order), 2, -1), share,
-        int(coupled.sum()), active, rounding,
+        motion, first, rates[order], decays, steepest, exponents, into, np.ascontiguousarray(out), flexibility,
+        flexible, coupling.reshape(len(order), 2, -1), share, int(coupled.sum()), active, rounding,
     )  # fmt: skip

@@ -143,11 +143,11 @@ class _Linearised:
             panels, start = split(panels, start, parts)
             parts, total = self._evaluated(panels)
         rest = 0.0
-        if self._dynamic and blocks.decays[: self._dynamic].min() * 2.0 * math.pi < _FORGOTTEN * state.rate:
+        if blocks.steepest[self._dynamic] * 2.0 * math.pi < _FORGOTTEN * state.rate:
             first, rest = longest_rest(self.spans, self.law, self.base, self.active, start)
             panels, start = np.roll(panels, -first, axis=0), (start - first) % len(panels)
             self._evaluated(panels)
-        self.start, self.coupled = start, bool(self._held.any())
+        self.start = start
         own.locate(self.events, start, laws.owner, len(panels))
         self._propagate(rest)
 
@@ -185,7 +185,7 @@ class _Linearised:
         parts: np.ndarray
         total: float
         blocks, resolved = self._blocks, (self.state.basis.harmonics + 0.5) * self.state.rate
-        parts, total, self._dynamic, self.neglected = parts_needed(
+        parts, total, self._dynamic, self.neglected, self.coupled = parts_needed(
             self.spans, self._forces, self.law, self.base, self.active, self._most, self._held, blocks.rates,
             blocks.decays, blocks.flexibility, blocks.share, blocks.first, blocks.coupled, resolved, _LIMITS,
         )  # fmt: skip
@@ -195,9 +195,8 @@ class _Linearised:
         """States at the end of the period, (S, columns); see `propagate.march`."""
         blocks = self._blocks
         total = np.zeros((blocks.first[self._dynamic], columns))
-        total[self._kept, np.arange(self.size)] = 1.0
         march(
-            self._structures, blocks.first, blocks.driven, law, self.base, kick, self.active, total, self.size,
+            self._structures, blocks.first, blocks.driven, law, self.base, kick, self.active, total, self._kept,
             self._acting, self._solved,
         )  # fmt: skip
         return total
@@ -456,12 +455,12 @@ def floquet_multipliers(state: BalanceState) -> FloquetResult:
     if not np.isfinite(motion.before).all():
         return _no_numbers(state, motion.size + len(mu))
     if motion.size:
-        with_states = _with_states(motion)
-        mu, errors = np.concatenate((with_states[0], mu)), np.concatenate((with_states[1], errors))
-        if len(mu) > motion.size:
-            order = np.argsort(-np.abs(mu), kind="stable")
-            mu, errors = mu[order], errors[order]
-    return FloquetResult(mu, errors)
+        own, own_errors = _with_states(motion)
+        if not len(mu):
+            return FloquetResult(own, own_errors)
+        mu, errors = np.concatenate((own, mu)), np.concatenate((own_errors, errors))
+    order = np.argsort(-np.abs(mu), kind="stable")
+    return FloquetResult(mu[order], errors[order])
 
 
 def _with_states(motion: _Linearised) -> tuple[ComplexArray, Array]:

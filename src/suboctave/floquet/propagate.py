@@ -165,8 +165,8 @@ def _solve(reading, influence, total, values, acts, rows, count, moving, forced,
 
 
 @kernel(fastmath=_FAST, error_model="numpy")
-def march(structures, first, driven, law, base, kick, active, total, free, acting, solved):
-    """Move perturbations on along the panels of one period, in place, and the response to the forces r with them.
+def march(structures, first, driven, law, base, kick, active, total, kept, acting, solved):
+    """Perturbations along the panels of one period, and with them the response to the forces r.
 
     Parameters
     ----------
@@ -178,12 +178,12 @@ def march(structures, first, driven, law, base, kick, active, total, free, actin
     active
         The channels that act, (G,).
     total
-        States, (S, free) or (S, free + 1): the last column feels r.
-    free
-        How many columns are perturbations.
+        Zeros; in the end states, (S, kept) or (S, kept + 1): the last column feels r.
+    kept
+        The states that perturbations begin with, (kept,).
     acting, solved
         Which channels have stiffness or damping on which panels, (P, G), and all forces at the nodes,
-        (P, G m, free + 1); empty without r. Of channels that do not act the last column alone is there.
+        (P, G m, kept + 1); empty without r. Of channels that do not act the last column alone is there.
 
     Notes
     -----
@@ -191,7 +191,10 @@ def march(structures, first, driven, law, base, kick, active, total, free, actin
     """
     kinds, moved, reading, influence, entering = structures
     groups, m, (size, columns) = active.shape[0], ORDER, total.shape
+    free = kept.shape[0]
     forced, forces = columns > free, groups * m
+    for i in range(free):
+        total[kept[i], i] = 1.0
     values, acts, rows = np.empty((3, forces)), np.empty(groups, dtype=np.bool_), np.empty(forces, dtype=np.int64)
     a, f, speed = np.empty((forces, forces)), np.empty((forces, columns)), np.empty((forces, columns))
     all_rows, packed = np.arange(size), np.empty((size, max(forces, 1)))

@@ -91,8 +91,8 @@ def with_states(most, held, rates, decays, flexibility, reach, first, coupled, r
 def parts_needed(
     spans, forces, law, base, active, most, held, rates, decays, flexibility, share, first, coupled, resolved, limits
 ):  # fmt: skip
-    """Into how many parts panels with dt/ds = spans (P, m) have to be cut, (P,), how many there are then, a float, and
-    what `with_states` says.
+    """Into how many parts panels with dt/ds = spans (P, m) have to be cut, (P,), how many there are then, a float, what
+    `with_states` says, and whether any channel acts.
 
     forces (C, .): Fourier coefficients of all channels; law, base, active: see `march`; rates, ..., resolved: see
     `with_states`. limits: how far blocks without states may move multipliers, and how much further where the motion
@@ -107,7 +107,7 @@ def parts_needed(
         for j in range(m):
             lengths[p] += WEIGHTS[j] * spans[p, j]
         time += lengths[p]
-    left, whole = 0.0, _TINY
+    left, whole, acting = 0.0, _TINY, False
     for g in range(groups):
         channel, size = active[g], 0.0
         held[0, g] = held[1, g] = 0.0
@@ -122,6 +122,7 @@ def parts_needed(
         for h in range(forces.shape[1]):
             size += abs(forces[channel, h])
         whole = max(whole, size)
+        acting = acting or held[0, g] > 0.0 or held[1, g] > 0.0
     tolerable = limits[0] + limits[1] * min(1.0, left / whole)
     dynamic, neglected = with_states(
         most, held, rates, decays, flexibility, share[0], first, coupled, resolved, time, tolerable
@@ -145,4 +146,4 @@ def parts_needed(
         total += wanted
         # no more than a number of parts: beyond a million nothing is cut
         parts[p] = int(min(wanted, 1e6)) if wanted >= 1.0 else 1
-    return parts, total, dynamic, neglected
+    return parts, total, dynamic, neglected, acting
