@@ -197,9 +197,9 @@ def test_another_multiplier_on_the_circle_beside_a_bifurcation():
 
     The monodromy matrix alone says so; by default its witnesses know the pair to the last digits.
     """
-    system = so.System(
-        np.eye(2), np.diag([0.1, 1e-9]), np.diag([1.0, 2.0]), [so.CubicSpring(0, 1.0)], [so.HarmonicLoad(0, 0.3)]
-    )
+    # a spring at the one at rest: multipliers of motions that no element feels are known to rounding
+    springs = [so.CubicSpring(0, 1.0), so.CubicSpring(1, 1.0)]
+    system = so.System(np.eye(2), np.diag([0.1, 1e-9]), np.diag([1.0, 2.0]), springs, [so.HarmonicLoad(0, 0.3)])
     for method, said in (("monodromy", True), (None, False)):
         curve = so.frequency_response(system, (1.9, 1.2), 11, stability=method)
         assert len(curve.bifurcations["LP"]) == 2
