@@ -56,7 +56,7 @@ def rewritten(orbit, harmonics, nu):
         balance=HarmonicBalance(orbit.system, basis).settle(
             orbit.basis.resized(orbit.coefficients, basis), orbit.omega
         ),
-        coefficients=orbit.basis.resized(orbit.coefficients, basis),
+        x=orbit.basis.resized(orbit.x, basis),
     )
 
 

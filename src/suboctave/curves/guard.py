@@ -31,7 +31,7 @@ from suboctave.curves.interior import FINEST, Interior, Steps, unsettled
 from suboctave.curves.sample import Sample
 from suboctave.curves.trace import Audit
 from suboctave.errors import ConvergenceError
-from suboctave.floquet.symmetric import relative_functions
+from suboctave.floquet.held import of_those_moved
 from suboctave.harmonic.basis import ComplexArray
 
 #: multipliers of modulus above one half may move by this much per interval (relative to their modulus above one)
@@ -218,7 +218,7 @@ class GuardedStep(Interior):
         return known
 
     def relative(self, stencil: Sequence[Sample]) -> Sequence[Array]:
-        known = () if self.turned else relative_functions([(s.floquet.multipliers, s.linear) for s in stencil])
+        known = () if self.turned else of_those_moved([(s.floquet.multipliers, s.grip) for s in stencil])
         return [np.column_stack((np.full(2, np.nan), one)) for one in known]
 
     def measures(self, sample: Sample) -> Array:

@@ -25,9 +25,9 @@ from suboctave.curves.kinds.grazing import GrazingEquations
 from suboctave.curves.kinds.singular import SingularEquations, SingularOperator
 from suboctave.curves.motion import MotionEvaluation, MotionProblem
 from suboctave.curves.trace import BranchPoint
+from suboctave.floquet.held import Grip, grip
 from suboctave.floquet.methods import Monodromy, StabilityMethod
 from suboctave.floquet.result import FloquetResult
-from suboctave.floquet.symmetric import linear_multipliers
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.orbit import PeriodicOrbit
@@ -148,9 +148,9 @@ class Sample:
         return measures.measured(point.tangent, point.weights, point.curve.parameter, self.floquet)
 
     @lazy
-    def linear(self) -> ComplexArray:
-        """The multipliers of the linear structure without elements over the motion's period."""
-        return linear_multipliers(self.state.linear, 2.0 * math.pi / self.state.rate)
+    def grip(self) -> Grip:
+        """What elements may do to the vibrations of the structure."""
+        return grip(self.state, self.floquet.multipliers)
 
     # ---------------------------------------------------------------------------------- along curves of bifurcations
     @property

@@ -188,7 +188,7 @@ class Reduction:
 
 
 def factorised(matrix: Any) -> Any:
-    """The solver of a large sparse matrix; for symmetric patterns its pivots stay on the diagonal where they can."""
+    """The solver of a large sparse matrix whose pivots stay on the diagonal, which keeps the factors sparse."""
     import scipy.sparse
     from scipy.sparse.linalg import splu
 
@@ -196,7 +196,7 @@ def factorised(matrix: Any) -> Any:
         factors = splu(
             scipy.sparse.csc_matrix(matrix),
             permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.01,
+            diag_pivot_thresh=0.0,
             options={"SymmetricMode": True},
         )
     except RuntimeError as failure:
@@ -204,6 +204,8 @@ def factorised(matrix: Any) -> Any:
 
     def solve(columns: Array) -> Array:
         result: Array = factors.solve(np.ascontiguousarray(columns))
+        # without pivots off the diagonal digits may be lost: once more for what is left over
+        result += factors.solve(columns - matrix @ result)
         return result
 
     return solve
