@@ -27,7 +27,7 @@ from scipy.linalg import eigh
 
 from suboctave.errors import InputError, shortened
 from suboctave.harmonic.basis import Array, ComplexArray
-from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
+from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices, in_words, natural_frequencies
 from suboctave.harmonic.reduction import Projected, Reduction
 from suboctave.lazy import lazy
 from suboctave.model.inputs import check_count, check_is_system, observed_dof
@@ -137,24 +137,13 @@ class Condensed:
         """Natural frequencies of the structure as seen from its unknowns, rad per unit time, ascending, (N,); 0 for
         rigid-body motions.
         """
-        mass, _, stiffness = self._matrices
-        values = eigh(0.5 * (stiffness + stiffness.T), 0.5 * (mass + mass.T), eigvals_only=True)
-        rigid = np.abs(values) <= 1e-10 * np.abs(np.median(values))
-        return np.sqrt(np.where(rigid, 0.0, np.maximum(values, 0.0)))
+        return natural_frequencies(self)
 
     def __repr__(self) -> str:
-        lowest = self.frequencies[:6]
-        shown = ", ".join(f"{w:.6g}" for w in lowest), ", ".join(f"{w / (2.0 * np.pi):.6g}" for w in lowest)
         whole = self.projected.shapes is None
-        modes = "as it is" if whole else f"{len(self._matrices[0])} modes"
-        lines = [
-            f"Linear part: {self.system.n} degrees of freedom, {modes}, {self.size} unknown displacements",
-            f"  natural frequencies {shown[0]} rad per unit time",
-            f"                      {shown[1]} Hz",
-        ]
-        if not whole:
-            lines.append(f"  for frequencies up to {self.covers:.6g}; error of the flexibility there {self.error:.1e}")
-        return "\n".join(lines)
+        shown = in_words(self, self.system.n, "as they are" if whole else f"{len(self._matrices[0])} modes")
+        for_ = f"\n  for frequencies up to {self.covers:.6g}; error of the flexibility there {self.error:.1e}"
+        return shown if whole else shown + for_
 
     # ------------------------------------------------------------------------------------------------- other values
     def rebuilt(self, values: Mapping[str, float]) -> Condensed:

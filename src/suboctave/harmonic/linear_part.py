@@ -17,6 +17,7 @@ from collections.abc import Mapping
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
+import scipy.linalg
 from numpy.typing import NDArray
 
 from suboctave.compiled import kernel
@@ -82,6 +83,9 @@ class StructuralMatrices:
         #: M, C, K, shape (3, n, n)
         self.matrices = np.array(system.matrices(self.values), dtype=float)
 
+    def __repr__(self) -> str:
+        return in_words(self, self.size, "as they are")
+
     def rebuilt(self, values: Mapping[str, float]) -> StructuralMatrices:
         """The same structure at other parameter values."""
         return StructuralMatrices(self.system, values)
@@ -130,6 +134,25 @@ class StructuralMatrices:
     def covering(self, frequency: float) -> StructuralMatrices:
         """The matrices serve at any frequency."""
         return self
+
+
+def natural_frequencies(linear: LinearPart) -> Array:
+    """Circular natural frequencies of its equation of motion, undamped, ascending, (N,); 0 for what is free to move."""
+    mass, _, stiffness = linear.equation_of_motion()
+    values = scipy.linalg.eigh(0.5 * (stiffness + stiffness.T), 0.5 * (mass + mass.T), eigvals_only=True)
+    free = np.abs(values) <= 1e-10 * np.abs(np.median(values))
+    return np.sqrt(np.where(free, 0.0, np.maximum(values, 0.0)))
+
+
+def in_words(linear: LinearPart, dofs: int, how: str) -> str:
+    """How many degrees of freedom are taken how, what is unknown, and the first natural frequencies."""
+    lowest = natural_frequencies(linear)[:6]
+    units = (("rad per unit time", 1.0), ("Hz, if that is a second", 2.0 * np.pi))
+    shown = [f"{', '.join(f'{w / unit:.6g}' for w in lowest)} {name}" for name, unit in units]
+    return (
+        f"Linear part: {dofs} degrees of freedom, {how}; {linear.size} unknown displacements\n"
+        f"  natural frequencies {shown[0]}\n                      {shown[1]}"
+    )
 
 
 def _blocks(matrices: Array, frequency: Array, order: int) -> ComplexArray:

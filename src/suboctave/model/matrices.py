@@ -21,6 +21,8 @@ from suboctave.model.expressions.coefficients import Coefficient, coefficient
 _ASYMMETRY = 1e-9
 #: degrees of freedom up to which eigenvalues are cheap; beyond, pivots and diagonals are taken
 _DENSE = 600
+#: and up to which a sparse matrix is written out
+_MOST_DENSE = 12000
 #: share of the largest eigenvalue of a damping below which a negative one is rounding
 _ROUNDING = 1e-9
 
@@ -48,6 +50,12 @@ class MatrixCoefficient:
     def value(self, values: Mapping[str, float]) -> Array:
         """The matrix (n, n) at these values of the parameters, as a dense array of its own."""
         if self.sparse:
+            if self.n > _MOST_DENSE:
+                raise InputError(
+                    f"{self.what} as a dense array of {self.n} degrees of freedom takes {8e-9 * self.n**2:.0f} GB: "
+                    "time integration and what rests on it are for smaller systems; project this one onto its lowest "
+                    "modes and what the forces deflect"
+                )
             return np.asarray(self.sparse_value(values).toarray(), dtype=float)
         result: Array = self._base.copy()
         for c, pattern in self._terms:

@@ -23,6 +23,7 @@ from suboctave.kinds import KINDS
 from suboctave.model.system import System
 from suboctave.results.readings import BranchReadings, columns, with_readings
 from suboctave.store.layout import parameter_column
+from suboctave.store.plain import padded
 from suboctave.store.registry import Stored
 from suboctave.store.table import write_csv
 
@@ -61,10 +62,17 @@ class CurveTables(Stored, ABC):
         return plot(self, path, **options)
 
 
+def _table(rows: list[Any]) -> Array:
+    """An array of numbers, or of rows, which may have several lengths: nan behind the shorter ones."""
+    if len({np.shape(row) for row in rows}) > 1:
+        return padded(rows, np.result_type(*rows).type)
+    return np.array(rows)
+
+
 def _over_points(path: str, meaning: str) -> Any:
     """What every point has under a dotted name, as an array along the branch."""
     read = attrgetter(path)
-    column = cached_property(lambda branch: np.array([read(point) for point in branch.points]))
+    column = cached_property(lambda branch: _table([read(point) for point in branch.points]))
     column.__doc__ = meaning
     return column
 
@@ -159,7 +167,8 @@ class Branch(CurveTables, BranchReadings):
 
     omega: Array = _over_points("orbit.omega", "Circular frequency of the load, shape (len,).")
     multipliers: ComplexArray = _over_points(
-        "floquet.multipliers", "Floquet multipliers over the response period, by descending modulus, shape (len, 2 n)."
+        "floquet.multipliers",
+        "Floquet multipliers over the response period, by descending modulus, shape (len, 2 N); nan behind shorter rows.",
     )
     multiplier_errors: Array = _over_points("floquet.errors", "Estimated errors of the multipliers, shape (len, 2 n).")
     arclength: Array = _over_points("arclength", "Distance along the branch in scaled arclength, shape (len,).")

@@ -47,6 +47,8 @@ from suboctave.verification.result import (
 LOCATED = ("LP", "BP", "PD", "NS")
 #: how far along the curve of motions one is searched, in tolerances, and the passes through it that may be spent
 _REACH, _PASSES = 100.0, 120
+#: degrees of freedom up to which motions are verified
+_MOST_DOFS = 400
 
 
 def stability(
@@ -175,8 +177,11 @@ def distance_from_gap(what: Bifurcation, state: Array, omega: float) -> float:
 
 
 def _check_whole(motion: PeriodicOrbit) -> None:
-    if motion.coefficients.shape[1] != motion.system.n:
-        raise InputError("only motions with all DOFs of the system can be verified by shooting")
+    if motion.system.n > _MOST_DOFS:
+        raise InputError(
+            f"shooting integrates all degrees of freedom, and is for up to {_MOST_DOFS}; this system has "
+            f"{motion.system.n}: project it onto its lowest modes and what the forces deflect, and verify that"
+        )
 
 
 def _by_shooting(motion: PeriodicOrbit, kind: str, start: Array, tolerance: float) -> PeriodicSolution:
