@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
-from suboctave.errors import InputError, shortened
+from suboctave.errors import ConvergenceError, InputError, shortened
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices, in_words, natural_frequencies
 from suboctave.harmonic.reduction import Projected, Reduction
@@ -40,6 +40,8 @@ _DEPENDENT = 1e-9
 _ROUNDING, _BESIDE = 1e-12, 1e-9
 #: growth of the highest frequency that a basis is made for, when motions go beyond it
 _BEYOND = 1.5
+#: and beyond which it is no motion of interest
+_TOO_FAR = 8.0
 
 
 class Blocks(NamedTuple):
@@ -156,6 +158,10 @@ class Condensed:
         """This part, or one that serves up to a frequency beyond what it covers."""
         if frequency <= self.covers * (1.0 + 1e-9):
             return self
+        if not frequency <= _TOO_FAR * self.covers:
+            raise ConvergenceError(
+                f"a frequency of {frequency:.3g} is far beyond {self.covers:.3g}, which the structure is projected for"
+            )
         if self._wider is None or self._wider.covers < frequency:
             projected = self.reduction.covering(_BEYOND * frequency, self.values)
             self._wider = Condensed(self.reduction, projected, self.values)

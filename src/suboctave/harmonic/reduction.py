@@ -37,8 +37,11 @@ _TOLERANCE = 1e-11
 _TESTED, _AT_ONCE = tuple(np.linspace(1.0, 0.0, 17)[:-1].tolist()), 2
 #: part of the residual, relative to the largest, that is worth a vector
 _WORTH = 1e-6
-#: error below which a basis converges, and steps without progress after which rounding is taken to be all that is left
-_PROMISING, _PATIENCE = 1e-3, 4
+#: error below which steps without progress, so many, mean that rounding is all that is left
+_PROMISING, _PATIENCE = 1e-5, 4
+#: change of the flexibility by the last vectors, relative, at this many frequencies, up to which vibrations between the
+#: tested ones are known as well
+_SETTLED, _COMPARED = 1e-7, 96
 #: most vectors of a basis
 _MOST = 600
 #: relative change of an expression in a matrix that a basis is trusted over without a test
@@ -120,7 +123,7 @@ class Reduction:
         if not self._shapes.shape[1]:
             self._add(self._solve(columns), matrices, images)
         best, since = math.inf, 0
-        order = list(range(len(_TESTED)))
+        order, known = list(range(len(_TESTED))), np.zeros((1, 1, 1), dtype=complex)
         while True:
             check_time()
             small = [self._shapes.T @ image for image in images]
@@ -136,7 +139,9 @@ class Reduction:
                 if worst > _TOLERANCE and len(left) >= _AT_ONCE:
                     break
             best, since = (worst, 0) if worst < 0.5 * best or worst > _PROMISING else (best, since + 1)
-            if worst <= _TOLERANCE or since >= _PATIENCE or self._shapes.shape[1] >= min(_MOST, self.system.n):
+            known, last = _flexibilities(small, self._shapes.T @ columns, top), known
+            settled = (worst <= _TOLERANCE or since >= _PATIENCE) and _change(last, known) <= max(_SETTLED, 3.0 * worst)
+            if settled or self._shapes.shape[1] >= min(_MOST, self.system.n):
                 return
             self._add(np.concatenate(left, axis=1), matrices, images)
 
@@ -185,6 +190,22 @@ class Reduction:
         off = np.abs(seen @ np.linalg.solve(k - top**2 * m + 1j * top * c, seen.T) - exact)
         size = np.sqrt(np.abs(exact.diagonal()))
         return Projected(matrices, shapes, seen, top, float((off / np.multiply.outer(size, size)).max()))
+
+
+def _flexibilities(small: list[Array], seen: Array, top: float) -> ComplexArray:
+    """Of a projection, M, C, K (r, r), along directions in its basis (r, m), at many frequencies, (F, m, m)."""
+    mass, damping, stiffness = small
+    w = np.linspace(top / _COMPARED, top, _COMPARED)[:, None, None]
+    columns = np.broadcast_to(seen.astype(complex), (len(w), *seen.shape))
+    return np.asarray(seen.T @ np.linalg.solve(stiffness - w**2 * mass + 1j * w * damping, columns), dtype=complex)
+
+
+def _change(one: ComplexArray, other: ComplexArray) -> float:
+    """Largest change of a flexibility, relative to its diagonal; infinite from none."""
+    if one.shape != other.shape:
+        return math.inf
+    size = np.sqrt(np.abs(np.einsum("fii->fi", other)))
+    return float((np.abs(one - other) / (size[:, :, None] * size[:, None, :])).max())
 
 
 def factorised(matrix: Any) -> Any:

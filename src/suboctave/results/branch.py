@@ -168,7 +168,7 @@ class Branch(CurveTables, BranchReadings):
     omega: Array = _over_points("orbit.omega", "Circular frequency of the load, shape (len,).")
     multipliers: ComplexArray = _over_points(
         "floquet.multipliers",
-        "Floquet multipliers over the response period, by descending modulus, shape (len, 2 N); nan behind shorter rows.",
+        "Floquet multipliers over the response period, by descending modulus, (len, 2 N); nan behind shorter rows.",
     )
     multiplier_errors: Array = _over_points("floquet.errors", "Estimated errors of the multipliers, shape (len, 2 n).")
     arclength: Array = _over_points("arclength", "Distance along the branch in scaled arclength, shape (len,).")
