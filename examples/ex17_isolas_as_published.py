@@ -34,9 +34,9 @@ print(f"largest gap of the period doublings   omega = {largest.omega:.6f}, j = {
 def as_doubled(orbit):
     """A motion of the load's period written as one of twice that period."""
     basis = orbit.basis.doubled
-    x = orbit.basis.resized(orbit.coefficients, basis)
+    x = orbit.basis.resized(orbit.x, basis)
     balance = orbit.balance.with_basis(basis).settle(x, orbit.omega, orbit.values)
-    return replace(orbit, balance=balance, coefficients=x)
+    return replace(orbit, balance=balance, x=x)
 
 
 def singularity(orbit):
