@@ -107,6 +107,18 @@ def _transposed(matrices: ComplexArray) -> ComplexArray:
     return matrices.transpose(0, 2, 1)
 
 
+class Coordinates(NamedTuple):
+    """Static modes E (r, m), vibrations N (r, s) of the structure held at its unknowns and the squares of their
+    frequencies (s,), `S = K + unit M` and `(D S^-1 D^T)^-1`, (m, m).
+    """
+
+    static: Array
+    free: Array
+    squares: Array
+    unit: float
+    held: Array
+
+
 class Condensed:
     """The condensed linear part of a system at values of its parameters; made by `linear_part_of`.
 
@@ -169,17 +181,15 @@ class Condensed:
 
     # -------------------------------------------------------------------------------------------------- coordinates
     @lazy
-    def _coordinates(self) -> tuple[Array, Array, Array]:
-        """E (r, m), N (r, s), and `D S^-1 D^T` inverted."""
+    def _coordinates(self) -> Coordinates:
         mass, _, stiffness = self._matrices
         mass, stiffness = 0.5 * (mass + mass.T), 0.5 * (stiffness + stiffness.T)
         values, modes = eigh(stiffness, mass)
         # a unit of stiffness that the structure has, also where some of it moves freely
         sizes = np.sort(np.abs(values))
-        unit = sizes[np.argmax(sizes > 1e-9 * np.median(sizes))]
-        self._unit = unit
+        unit = float(sizes[np.argmax(sizes > 1e-9 * np.median(sizes))])
         if not np.all(values > -0.5 * unit):
-            unit = self._unit = 2.0 * float(-values.min())
+            unit = 2.0 * float(-values.min())
         seen = self.projected.seen @ modes
         weight = 1.0 / (values + unit)
         held = np.linalg.inv((seen * weight) @ seen.T)
@@ -187,13 +197,11 @@ class Condensed:
         # orthonormal vibrations that are not seen: the rest of an orthogonal matrix
         null = np.linalg.qr(seen.T, mode="complete")[0][:, self.size :]
         squares, turn = eigh((null * values[:, None]).T @ null) if null.shape[1] else (np.zeros(0), np.zeros((0, 0)))
-        self._squares = squares
-        return static, modes @ (null @ turn), held
+        return Coordinates(static, modes @ (null @ turn), squares, unit, held)
 
     def _split(self, matrices: Array) -> list[tuple[Array, Array, Array, Array]]:
         """Matrices (3, r, r) in the coordinates (q, z), each as qq, qz, zq, zz."""
-        static, free, _ = self._coordinates
-        left = np.concatenate((static, free), axis=1).T
+        left = np.concatenate((self._coordinates.static, self._coordinates.free), axis=1).T
         m, parts = self.size, []
         for matrix in matrices:
             whole = left @ matrix @ left.T
@@ -203,13 +211,13 @@ class Condensed:
     @lazy
     def _own(self) -> Stack:
         """M, C, K in the coordinates (q, z)."""
-        _, _, held = self._coordinates
+        _, _, squares, unit, held = self._coordinates
         mass, damping, _ = self._split(self._matrices)
         k = self._matrices[2]
         skew = self._split(0.5 * (k - k.T)[None])[0]
         # K = S - unit M, and S has no coupling
-        whole = (held - self._unit * mass[0], -self._unit * mass[1], -self._unit * mass[2], np.diag(self._squares))
-        mass = (*mass[:3], np.eye(len(self._squares)))
+        whole = (held - unit * mass[0], -unit * mass[1], -unit * mass[2], np.diag(squares))
+        mass = (*mass[:3], np.eye(len(squares)))
         stiffness = tuple(one + other for one, other in zip(whole, skew, strict=True))
         return Stack.of([mass, damping, stiffness])
 
@@ -305,7 +313,7 @@ class Condensed:
 
     def recovered(self, frequency: Array, amplitudes: ComplexArray) -> ComplexArray:
         """See `LinearPart.recovered`."""
-        static, free, _ = self._coordinates
+        static, free = self._coordinates.static, self._coordinates.free
         inner = (self._eliminated(frequency)[1] @ amplitudes[:, :, None])[:, :, 0]
         result: ComplexArray = amplitudes @ static.T - inner @ free.T
         return result

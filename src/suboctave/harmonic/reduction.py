@@ -23,10 +23,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.linalg import eigh
 
-from suboctave.errors import InputError
+from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.interruption import check_time
-from suboctave.model.matrices import MatrixCoefficient
+from suboctave.model.matrices import MatrixCoefficient, sparse_factors
 from suboctave.model.system import System
 
 #: degrees of freedom up to which a structure is taken as it is
@@ -42,6 +42,8 @@ _PROMISING, _PATIENCE = 1e-5, 4
 #: change of the flexibility by the last vectors, relative, at this many frequencies, up to which vibrations between the
 #: tested ones are known as well
 _SETTLED, _COMPARED = 1e-7, 96
+#: error of the flexibility, relative, beyond which a projection is refused
+_WRONG = 1e-3
 #: most vectors of a basis
 _MOST = 600
 #: relative change of an expression in a matrix that a basis is trusted over without a test
@@ -167,6 +169,8 @@ class Reduction:
         square = candidates.T @ (mass @ candidates)
         sizes, turn = np.linalg.eigh(0.5 * (square + square.T))
         kept = sizes > _WORTH**2 * sizes[-1]
+        # no more than there are degrees of freedom
+        kept[: max(0, len(kept) - (self.system.n - self._shapes.shape[1]))] = False
         new = candidates @ (turn[:, kept] / np.sqrt(sizes[kept]))
         for _ in range(2):
             new = new - self._shapes @ (images[0].T @ new)
@@ -189,7 +193,13 @@ class Reduction:
         exact = exact_flexibility(self.system, self.directions, top, values)
         off = np.abs(seen @ np.linalg.solve(k - top**2 * m + 1j * top * c, seen.T) - exact)
         size = np.sqrt(np.abs(exact.diagonal()))
-        return Projected(matrices, shapes, seen, top, float((off / np.multiply.outer(size, size)).max()))
+        error = float((off / np.multiply.outer(size, size)).max())
+        if not error <= _WRONG:
+            raise ConvergenceError(
+                f"the projection of the structure has an error of {error:.1e} at the frequency {top:.6g} with "
+                f"{shapes.shape[1]} vectors: keep fewer harmonics, or damp the structure more"
+            )
+        return Projected(matrices, shapes, seen, top, error)
 
 
 def _flexibilities(small: list[Array], seen: Array, top: float) -> ComplexArray:
@@ -209,17 +219,9 @@ def _change(one: ComplexArray, other: ComplexArray) -> float:
 
 
 def factorised(matrix: Any) -> Any:
-    """The solver of a large sparse matrix whose pivots stay on the diagonal, which keeps the factors sparse."""
-    import scipy.sparse
-    from scipy.sparse.linalg import splu
-
+    """The solver of a large sparse matrix."""
     try:
-        factors = splu(
-            scipy.sparse.csc_matrix(matrix),
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )
+        factors = sparse_factors(matrix)
     except RuntimeError as failure:
         raise InputError(f"the stiffness cannot be factorised ({failure}): is a part of the structure empty?") from None
 

@@ -244,27 +244,31 @@ def _lowest(scaled: Any) -> float:
     """The lowest eigenvalue, or for a large matrix the smallest pivot, which has its sign."""
     if scaled.shape[0] <= _DENSE:
         return float(np.linalg.eigvalsh(scaled)[0])
-    import scipy.sparse
-    from scipy.sparse.linalg import splu
-
     if isinstance(scaled, np.ndarray):
         try:
             return float(np.min(np.diag(np.linalg.cholesky(scaled)))) ** 2
         except np.linalg.LinAlgError:
             return float(np.linalg.eigvalsh(scaled)[0])
     try:
-        # pivots on the diagonal, as in a Cholesky factorisation: all positive if and only if the matrix is definite
-        factors = splu(
-            scipy.sparse.csc_matrix(scaled),
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )
+        # as in a Cholesky factorisation: all positive if and only if the matrix is definite
+        factors = sparse_factors(scaled)
     except RuntimeError:  # exactly singular
         return 0.0
     if np.any(factors.perm_r != factors.perm_c):  # a zero on the diagonal had to be avoided: indefinite
         return -1.0
     return float(factors.U.diagonal().min())
+
+
+def sparse_factors(matrix: Any) -> Any:
+    """SuperLU factors of a sparse matrix, real or complex, with its pivots on the diagonal, which keeps them sparse.
+
+    Raises `RuntimeError` if the matrix is exactly singular.
+    """
+    import scipy.sparse
+    from scipy.sparse.linalg import splu
+
+    columns = scipy.sparse.csc_matrix(matrix)
+    return splu(columns, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
 
 
 def check_damping(damping: Any, mass_diagonal: Any) -> None:

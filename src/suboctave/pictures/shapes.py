@@ -205,7 +205,7 @@ class _Shape:
         bar.set_label(style.checked_text(label), fontsize=self.look.normal, color=style.INK)
         bar.ax.tick_params(labelsize=self.look.small, color=style.INK)
         bar.outline.set_linewidth(0.5)
-        bar.formatter.set_powerlimits((-3, 4))  # type: ignore[attr-defined]
+        bar.ax.ticklabel_format(axis="y", style="sci", scilimits=(-3, 4))
         bar.ax.yaxis.get_offset_text().set_fontsize(self.look.small)
 
         text = f"displacements \u00d7 {self.scale:.3g}"

@@ -92,10 +92,10 @@ class ModalDamping:
     count: int | None = None
 
     def __post_init__(self) -> None:
-        several = isinstance(self.ratios, Sequence | np.ndarray) and not isinstance(self.ratios, str)
+        several = np.ndim(self.ratios) > 0
+        given = tuple(np.asarray(self.ratios, dtype=object).ravel().tolist())
         if several:
-            object.__setattr__(self, "ratios", tuple(self.ratios))  # type: ignore[arg-type]
-        given = self.ratios if isinstance(self.ratios, tuple) else (self.ratios,)
+            object.__setattr__(self, "ratios", given)
         if not given or not all(is_number(ratio) and ratio >= 0 for ratio in given):
             raise InputError(f"damping ratios are numbers from 0 on, not {shortened(self.ratios)}")
         if self.count is not None and (several or isinstance(self.count, bool) or self.count < 1):

@@ -10,6 +10,7 @@ from __future__ import annotations
 import difflib
 import operator
 import re
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -92,8 +93,7 @@ class DofMap:
         object.__setattr__(self, "labels", _labels(labels))
         object.__setattr__(self, "fixed", frozenset(_labels(fixed)))
         if len(self._places) < len(self.labels):
-            seen: set[Label] = set()
-            twice = next(label for label in self.labels if label in seen or seen.add(label))  # type: ignore[func-returns-value]
+            ((twice, _),) = Counter(self.labels).most_common(1)
             raise InputError(f"the DOF map names {_text(twice)} more than once; every label is for one DOF")
 
     @cached_property
