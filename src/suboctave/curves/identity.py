@@ -123,7 +123,8 @@ def gap_to(orbit: PeriodicOrbit, points: Sequence[BranchPoint], name: str = "", 
         return None
     nu = math.lcm(orbit.basis.nu, *(o.basis.nu for o in orbits))
     top = min(o.basis.harmonics * nu // o.basis.nu for o in (orbit, *orbits))
-    c = _written(orbit, nu, top)
+    scales = orbit.balance.scales()[0]
+    c = _written(orbit, nu, top, scales)
     unit = float(np.linalg.norm(c)) or 1.0
     names = {name: float(np.ptp([o.values[name] for o in orbits])) or 1.0} if name else {}
 
@@ -132,7 +133,7 @@ def gap_to(orbit: PeriodicOrbit, points: Sequence[BranchPoint], name: str = "", 
         places = [of.omega / orbit.omega, *(of.values[n] / size for n, size in names.items())]
         return np.concatenate((flat.real, flat.imag, places))
 
-    curve = np.array([vector(_written(o, nu, top), o) for o in orbits])
+    curve = np.array([vector(_written(o, nu, top, scales), o) for o in orbits])
     turns = _turns(top + 1, nu)
     shifted = [vector(turn * c, orbit) for turn in turns[::2]]
     reflected = [vector(-turn * c, orbit) for turn in turns[1::2]] if images else []
@@ -189,21 +190,21 @@ def _polynomial(s: Array, values: Array) -> Array:
 
 
 # ---------------------------------------------------------------------------------------------------------- amplitudes
-def _written(orbit: PeriodicOrbit, nu: int, top: int) -> ComplexArray:
-    """Complex amplitudes at k omega / nu, k = 0 .. top, DOFs in units of the square roots of their masses."""
+def _written(orbit: PeriodicOrbit, nu: int, top: int, scales: Array) -> ComplexArray:
+    """Complex amplitudes at k omega / nu, k = 0 .. top, DOFs multiplied by the square roots of their masses."""
     stride = nu // orbit.basis.nu
     kept = top // stride + 1
     c = np.zeros((top + 1, orbit.x.shape[1]), dtype=complex)
     c[: stride * (kept - 1) + 1 : stride] = to_complex(orbit.x)[:kept]
-    c *= orbit.balance.scales()[0]
-    return c
+    return c * scales
 
 
 def _together(one: PeriodicOrbit, other: PeriodicOrbit) -> tuple[int, ComplexArray, ComplexArray, float]:
     """Two motions in one basis, with the harmonics that both were solved with: nu, amplitudes, size of the larger."""
     nu = math.lcm(one.basis.nu, other.basis.nu)
     top = min(o.basis.harmonics * nu // o.basis.nu for o in (one, other))
-    a, b = _written(one, nu, top), _written(other, nu, top)
+    # a structure's masses are those of its projection, which may be another one for each
+    a, b = (_written(o, nu, top, one.balance.scales()[0]) for o in (one, other))
     return nu, a, b, max(float(np.linalg.norm(a)), float(np.linalg.norm(b)))
 
 

@@ -283,8 +283,10 @@ def _near(point: CurvePoint, multipliers: ComplexArray) -> bool:
     """Whether a point has multipliers close to given ones."""
     curve = point.curve
     assert isinstance(curve, MotionProblem)
-    own = np.sort_complex(floquet_multipliers(curve.balance.at(*curve.split(point.u))).multipliers)
-    expected = np.sort_complex(multipliers)
+    own = floquet_multipliers(curve.balance.at(*curve.split(point.u))).multipliers
+    # from a structure's larger projection there are more of them, the fast ones
+    count = min(len(own), len(multipliers))
+    own, expected = (np.sort_complex(mu[np.argsort(-np.abs(mu), kind="stable")][:count]) for mu in (own, multipliers))
     return float((np.abs(own - expected) / np.maximum(1.0, np.abs(expected))).max()) <= _CLOSE
 
 

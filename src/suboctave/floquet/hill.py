@@ -429,8 +429,8 @@ def _closed(mu: ComplexArray, errors: Array) -> tuple[ComplexArray, Array]:
     return closed, errors + np.abs(closed - mu)
 
 
-#: size of Hill's matrix above which its exponential acts on the start by its Taylor series, never formed
-_DENSE = 400
+#: terms of a Taylor step and what each costs besides, in multiplications; products that an exponential begins with
+_TERMS, _EACH, _BEGIN = 25, 1e6, 8
 #: largest Hill matrix that is attempted
 _LARGEST_PROJECTED = 6000
 #: perturbation harmonics, however few the motion has
@@ -476,7 +476,10 @@ def _propagated(system: Variational, doubled: np.ndarray, kept: int) -> Array:
         if c.any():
             parts.append((left, np.concatenate((0.0 * right, right)), _projected(c / system.rate, doubled, kept)))
     block = np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -damping]])
-    if size * 2 * n <= _DENSE:
+    steps, rows = _taylor_steps(block, parts, float(frequency[-1])), size * 2 * n
+    # the exponential of a matrix known by its action only, or of one that is formed: whichever costs less
+    action = rows * (2 * n * (2 * n + len(parts)) + len(parts) * (size + n))
+    if rows**3 * (_BEGIN + math.log2(steps)) <= steps * _TERMS * (action + _EACH):
         matrix = np.kron(np.eye(size), block)
         for left, right, projected in parts:
             matrix -= np.kron(projected, np.outer(np.concatenate((0.0 * left, left)), right))
@@ -485,7 +488,18 @@ def _propagated(system: Variational, doubled: np.ndarray, kept: int) -> Array:
         matrix += np.kron(turning, np.eye(2 * n))
         end = expm(2.0 * math.pi * matrix) @ start.reshape(-1, 2 * n)
         return np.asarray(end).reshape(start.shape)
-    return _by_taylor(start, block, parts, cosine, frequency)
+    return _by_taylor(start, block, parts, cosine, frequency, steps)
+
+
+def _taylor_steps(block: Array, parts: list[tuple[Array, Array, Array]], highest: float) -> int:
+    """Steps for a period, by the time scale of Hill's matrix: its norm, were velocities measured in the highest
+    frequency.
+    """
+    n = block.shape[0] // 2
+    stiff = float(np.abs(block[n:, :n]).sum(axis=1).max())
+    stiff += sum(float(np.abs(p).sum(axis=1).max() * np.abs(l).max() * np.abs(r[:n]).sum()) for l, r, p in parts)
+    drag = float(np.abs(block[n:, n:]).sum(axis=1).max())
+    return max(1, math.ceil(0.5 * math.pi * (highest + math.sqrt(stiff) + drag)))
 
 
 def _projected(spectrum: np.ndarray, doubled: np.ndarray, kept: int) -> Array:
@@ -497,7 +511,12 @@ def _projected(spectrum: np.ndarray, doubled: np.ndarray, kept: int) -> Array:
 
 
 def _by_taylor(
-    start: Array, block: Array, parts: list[tuple[Array, Array, Array]], cosine: np.ndarray, frequency: Array
+    start: Array,
+    block: Array,
+    parts: list[tuple[Array, Array, Array]],
+    cosine: np.ndarray,
+    frequency: Array,
+    steps: int,
 ) -> Array:
     """`exp(2 pi H)` on `start` by Taylor series of short steps: H is known by its action only."""
     n, size, columns = block.shape[0] // 2, len(start), start.shape[2]
@@ -517,12 +536,6 @@ def _by_taylor(
         out[n:] -= (pushed @ (felt @ inputs).reshape(len(felt), -1)).reshape(n, size, columns)
         return out
 
-    # the time scale of H: its norm, were velocities measured in the highest frequency
-    stiff = float(np.abs(block[n:, :n]).sum(axis=1).max())
-    stiff += sum(float(np.abs(p).sum(axis=1).max() * np.abs(l).max() * np.abs(r[:n]).sum()) for l, r, p in parts)
-    drag = float(np.abs(block[n:, n:]).sum(axis=1).max())
-    rate = float(frequency[-1]) + math.sqrt(stiff) + drag
-    steps = max(1, math.ceil(2.0 * math.pi * rate / 4.0))
     h = 2.0 * math.pi / steps
     z = np.ascontiguousarray(start.transpose(1, 0, 2))
     for _ in range(steps):

@@ -248,13 +248,24 @@ def pieces_of(curve: TrackedBranch, along: str, name: str = "omega") -> list[Mon
         start = -math.inf if first is None else first.arclength
         stop = math.inf if last is None else last.arclength
         before, after = ([] if event is None else [as_point(event)] for event in (first, last))
-        pieces.append(([*before, *(p for p in points if start < p.arclength < stop), *after], first, last))
+        between = [p for p in points if start < p.arclength < stop]
+        while between and _beyond(between[0], first, along):
+            del between[0]
+        while between and _beyond(between[-1], last, along):
+            del between[-1]
+        pieces.append(([*before, *between, *after], first, last))
     if curve.closed and turns:
         # the seam of a closed curve is no end: what begins there goes on from its last points
         nodes, _, last = pieces.pop(0)
         pieces[-1] = (pieces[-1][0] + nodes, pieces[-1][1], last)
     cut = (piece for uncut in pieces for piece in _one_way(*uncut, along))
     return [MonotonePiece(curve, along, name, tuple(nodes), (a, b)) for nodes, a, b in cut if len(nodes) > 1]
+
+
+def _beyond(point: TrackedPoint, end: TrackedEvent | None, along: str) -> bool:
+    """Whether a point beside an extremum lies beyond it, having fewer harmonics than that was located with."""
+    sign = {"maximum": 1.0, "minimum": -1.0}.get("" if end is None else end.extreme, 0.0)
+    return end is not None and sign * (point.orbit.values[along] - end.parameter(along)) > 0.0
 
 
 def as_point(item: Bifurcation) -> TrackedPoint:

@@ -86,6 +86,8 @@ class Search:
         self.values = tuple(values)
         self.met: dict[float, list[Branch]] = {}
         self.isolas: list[Isola] = []
+        #: pieces that limit points of an isola lie on, and between which values
+        self._held: list[tuple[Isola, MonotonePiece, float, float]] = []
         #: limit points, by value and piece, that lie on a branch that is not detached
         self._explained: set[tuple[float, MonotonePiece]] = set()
 
@@ -110,7 +112,7 @@ class Search:
 
     def _consider(self, loop: Loop) -> None:
         """A branch that is detached exists over some range, unless it is known; any other is known from now on."""
-        if any(_covers(isola, piece, loop.value) for isola in self.isolas for piece in loop.pieces):
+        if any(self.isola_on(piece, loop.value) for piece in loop.pieces):
             return
         if loop.detached and loop.pieces:
             catalogue, value = self.catalogue, loop.value
@@ -129,12 +131,20 @@ class Search:
             self.attach(loop)
 
     def _starts(self, values: Sequence[float]) -> Iterator[tuple[MonotonePiece, float]]:
-        """Limit points that may lie on an isola: beside centres, then those that no branch met explains.
-
-        Curves that become known on the way count as well.
-        """
-        name, bounds = self.catalogue.name, self.catalogue.bounds
+        """Limit points that may lie on an isola: beside centres, then those that no branch met explains."""
         done: set[int] = set()
+        yield from self._centres(done)
+        for value in values:
+            for piece in self.catalogue.limit_points:
+                unexplained = piece.contains(value) and (value, piece) not in self._explained
+                if unexplained and self.isola_on(piece, value) is None:
+                    yield piece, value
+                    # of curves that have become known by that
+                    yield from self._centres(done)
+
+    def _centres(self, done: set[int]) -> Iterator[tuple[MonotonePiece, float]]:
+        """Limit points beside centres that are not `done`, also of curves that become known on the way."""
+        name, bounds = self.catalogue.name, self.catalogue.bounds
         for piece in self.catalogue.pieces:
             for upper in (False, True):
                 event = piece.end(upper) if piece.kind == "LP" else None
@@ -147,11 +157,6 @@ class Search:
                 value = event.parameter(name)
                 beyond, _ = next(self.critical(piece.nu, value, not upper), (bounds[0 if upper else 1], []))
                 yield piece, 0.5 * (value + beyond)
-        for value in values:
-            for piece in self.catalogue.limit_points:
-                unexplained = piece.contains(value) and (value, piece) not in self._explained
-                if unexplained and not any(_covers(isola, piece, value) for isola in self.isolas):
-                    yield piece, value
 
     def result(self) -> Isolas:
         """The isolas and the curves that were followed, with the outcome in one sentence."""
@@ -197,6 +202,15 @@ class Search:
         pieces = (self.catalogue.known(item, value) for item in branch.bifurcations["LP"])
         return tuple(dict.fromkeys([*known, *(piece for piece in pieces if piece is not None)]))
 
+    def hold(self, isola: Isola, loop: Loop, one: float, other: float) -> None:
+        """Between two values an isola has limit points on the pieces of a loop."""
+        self._held += [(isola, piece, min(one, other), max(one, other)) for piece in loop.pieces]
+
+    def isola_on(self, piece: MonotonePiece, value: float) -> Isola | None:
+        """The isola that a piece's limit point at a value lies on, as far as isolas are known."""
+        held = (isola for isola, p, low, high in self._held if p is piece and low <= value <= high and value in isola)
+        return next(held, None)
+
     def attach(self, loop: Loop) -> None:
         """A branch that is not detached: its limit points at that value are explained."""
         if not loop.detached:
@@ -228,17 +242,20 @@ class _Direction:
         self.upper = upper
         self.isola = isola
         self.search = search
-        self.others = tuple(search.isolas)
         self.name = search.catalogue.name
         self.bound = search.catalogue.bounds[1 if upper else 0]
 
     def settle(self, loop: Loop) -> None:
         """Go on from a branch within the range until it vanishes, meets another one, or the range ends."""
-        ahead: Loop | None = loop
-        while ahead is not None and (step := next(self._relevant(ahead), None)) is not None:
-            ahead = self._behind(ahead, *step)
-        if ahead is not None:
-            self._cut(ahead)
+        ahead, since = loop, loop.value
+        while (step := next(self._relevant(ahead), None)) is not None:
+            self.search.hold(self.isola, ahead, since, step[0])
+            behind = self._behind(ahead, *step)
+            if behind is None:
+                return
+            ahead, since = behind, step[0]
+        self.search.hold(self.isola, ahead, since, self.bound)
+        self._cut(ahead)
 
     def _end(self, value: float, reason: str, event: TrackedEvent | None = None, centre: bool = False) -> None:
         """The range ends there: why, by which event, whether it shrinks to a point."""
@@ -293,7 +310,7 @@ class _Direction:
                 return None
             self._end(value, _merging(self.name, value, event, after), event)
             return None
-        other = next((o for o in self.others if any(_covers(o, piece, behind) for piece in after.pieces)), None)
+        other = next((o for piece in after.pieces if (o := self.search.isola_on(piece, behind)) is not None), None)
         if other is None:
             return self._take(after)
         place = ", ".join(
@@ -342,11 +359,6 @@ class _Direction:
         where = f"between {self.name} = {low:.6g} and {high:.6g}"
         self.isola.notes += (f"{where} it ceases to be detached, and no event that was found says why",)
         self._end(a, f"detached up to {self.name} = {a:.6g} at least, no longer at {b:.6g}")
-
-
-def _covers(isola: Isola, piece: MonotonePiece, value: float) -> bool:
-    """Whether a piece's limit point at a value lies on an isola."""
-    return piece in isola.pieces and value in isola
 
 
 def _reconnecting(events: list[TrackedEvent]) -> TrackedEvent | None:

@@ -1,0 +1,102 @@
+"""Isolas of structures: unknowns along the stops alone find what all degrees of freedom find."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+import scipy.sparse
+
+import suboctave as so
+from suboctave.curves import starts
+from suboctave.curves.identity import gap_to
+from suboctave.harmonic import HarmonicBalance, StructuralMatrices, reduction
+
+
+def between_stops(system_of, tip, Kc, p):
+    """A structure whose tip vibrates between two stops, at 1 to the left and at j to the right."""
+    stops = [so.ElasticStop(tip, "Kc", "j", side="right"), so.ElasticStop(tip, "Kc", -1.0, side="left")]
+    return system_of(stops, [so.HarmonicLoad(tip, "p")], {"Kc": Kc, "j": 0.2, "p": p})
+
+
+def chain(n=10):
+    """Its first natural frequency is 1, and so is the mass of that mode by the last mass."""
+    stiffness = scipy.sparse.diags_array([-np.ones(n - 1), np.full(n, 2.0), -np.ones(n - 1)], offsets=[-1, 0, 1])
+    stiffness = stiffness.tolil()
+    stiffness[n - 1, n - 1] = 1.0
+    mass = scipy.sparse.eye_array(n).tocsr()
+    squares, shapes = np.linalg.eigh(stiffness.toarray())
+    modal = shapes[n - 1, 0] ** 2
+    mass, stiffness = modal * mass, modal / squares[0] * stiffness.tocsr()
+    return between_stops(
+        lambda *parts: so.System(mass, 0.02 * mass + 0.04 * stiffness, stiffness, *parts), n - 1, 4.7, 0.8
+    )
+
+
+def beam(elements=100):
+    """As the chain, a cantilever of Hermite elements."""
+    density = 1.0 / (0.25 * 0.02**2)
+    young = density / so.structures.beam(1.0, 0.02, 0.02, 1.0, 1.0, elements).frequencies(1).omega[0] ** 2
+    structure = so.structures.beam(1.0, 0.02, 0.02, young, density, elements)
+    damping = so.Rayleigh(alpha=0.02, beta=0.04)
+    return between_stops(lambda *parts: structure.system(*parts, damping), structure.dof(elements, "z"), 2.0, 0.8)
+
+
+@pytest.fixture(scope="module")
+def of_chain():
+    return so.find_isolas(chain(), (1.9, 3.0), "j", (0.16, 0.3), harmonics=15, values=2)
+
+
+def test_two_isolas_of_a_chain(of_chain):
+    """One unknown for ten masses; the numbers are those with ten (below)."""
+    assert of_chain[0].known[min(of_chain[0].known)].orbits[0].balance.size == 1
+    births = sorted((float(isola.born), isola.born.omega) for isola in of_chain)
+    np.testing.assert_allclose(births, [(0.247847191, 2.37135034), (0.248643538, 2.43187641)], rtol=3e-9)
+
+
+def born_with(linear, isola, omega, x):
+    """Where an isola is born, along the limit points of its closed branch solved with another linear part."""
+    value = float(isola.born) - 0.1 * abs(float(isola.merges) - float(isola.born))
+    orbit = isola.at(value).orbits[0]
+    balance = HarmonicBalance(orbit.balance.system, orbit.basis, linear=linear, samples=orbit.balance.samples)
+    loop = so.continue_branch(dataclasses.replace(orbit, balance=balance, x=x(orbit)), "omega", omega, max_step=0.3)
+    assert loop.closed
+    assert loop.orbits[0].balance.size == linear.size
+    curve = so.track(loop.bifurcations["LP"][0], "j", (value - 0.01, float(isola.born) + 0.01))
+    births = [e for e in curve.extrema if e.isola == "isola_centre"]
+    assert curve.orbits[0].balance.size == linear.size
+    return min(births, key=lambda e: abs(e.omega - isola.born.omega))
+
+
+@pytest.mark.slow
+def test_the_same_births_with_all_masses_unknown(of_chain, monkeypatch):
+    isola = next(one for one in of_chain if float(one.born) < 0.248)
+    system = of_chain.system
+    monkeypatch.setattr(starts, "linear_part_of", lambda system, values=None, *_: StructuralMatrices(system, values))
+    event = born_with(StructuralMatrices(system), isola, (2.2, 2.7), lambda orbit: orbit.coefficients)
+    assert event.parameter("j") == pytest.approx(float(isola.born), rel=1e-9)
+    assert event.omega == pytest.approx(isola.born.omega, rel=1e-9)
+
+
+@pytest.mark.slow
+def test_the_same_birth_with_all_modes_of_a_beam(monkeypatch):
+    """Nine modes against two hundred."""
+    (isola,) = so.find_isolas(beam(), (1.8, 2.6), "j", (0.2, 0.6), harmonics=15, values=2)
+    monkeypatch.setattr(reduction, "COMPLETE", 200)
+    linear = so.condense(beam(), 2.6)
+    assert len(linear.equation_of_motion()[0]) == 200
+    event = born_with(linear, isola, (1.9, 2.5), lambda orbit: orbit.x)
+    # the beam of all modes in double is good to 1e-7
+    assert event.parameter("j") == pytest.approx(float(isola.born), rel=1e-6)
+    assert event.omega == pytest.approx(isola.born.omega, rel=1e-6)
+
+
+def test_a_limit_point_lies_on_its_curve_whatever_the_basis():
+    """Bases grow with the harmonics of motions, and what is compared must not depend on them."""
+    response = so.frequency_response(beam(40), (1.8, 2.6))
+    item = response.bifurcations["PD"][0]
+    curve = so.track(item, "j", (0.1, 0.3), max_step=0.3)
+    sizes = {len(orbit.balance.linear.equation_of_motion()[0]) for orbit in (item.orbit, *curve.orbits)}
+    assert gap_to(item.orbit, curve.points, "j") is not None
+    assert len(sizes) > 1
