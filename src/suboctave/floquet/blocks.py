@@ -13,11 +13,20 @@ closed form: `exp(L t) = e_0(t) + e_1(t) L`.
 Blocks come in the order of their rates |lambda|. Those that are too fast for a motion follow the forces at once,
 `q = R F` with their flexibility `R = -G L^-1 B`, and count no state. Blocks that no channel both reads and drives
 change no multiplier and come last.
+
+While channels have a constant stiffness, `F = K q + F'` between the instants at which contacts begin and end, the
+motion is linear with constant coefficients as well: with `M = (1 - R K)^-1`,
+
+    z' = (L + B K M G) z + B (1 - K R)^-1 F',    q = M G z + M R F',
+
+which eigenvectors separate into blocks again, a `Form` of the structure. The forms along a period, one after the other,
+make the motion of a structure with stops a product of exact exponentials.
 """
 
 from __future__ import annotations
 
 from functools import lru_cache
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -32,6 +41,8 @@ from suboctave.harmonic.linear_part import LinearPart
 _APART = 0.3
 #: product of reading and driving, relative to the largest, of a block that does not take part
 _UNCOUPLED = 1e-28
+#: condition of eigenvectors beyond which rounding would be seen in multipliers: contacts are then followed by panels
+_PARALLEL = 1e6
 _EPS = float(np.finfo(float).eps)
 
 
@@ -178,24 +189,33 @@ def _add_coupled(parts: _Parts, which: np.ndarray, k: Array, c: Array) -> float:
     scale = np.sqrt(np.abs(k.diagonal()))
     scale = np.where(scale > 0.0, scale, 1.0)
     matrix = np.block([[np.zeros((n, n)), np.diag(scale)], [-k / scale, -c]])
-    values, vectors = np.linalg.eig(matrix)
-    keep = values.imag >= 0.0
-    values, vectors = values[keep], vectors[:, keep]
-    real = values.imag == 0.0
-    # real and imaginary parts at right angles
-    vectors = vectors * np.exp(-0.5j * np.angle(np.sum(vectors**2, axis=0)))
-    basis = np.concatenate([v[:, None].real if r else np.stack((v.real, v.imag), 1)
-                            for v, r in zip(vectors.T, real, strict=True)], axis=1)  # fmt: skip
-    inverse = np.linalg.inv(basis)
+    basis, inverse, found = _separated(matrix)
     weights = np.concatenate((scale, np.ones(n)))
     states, at = np.concatenate((which, which + parts.count // 2)), 0
-    for value, single in zip(values, real, strict=True):
-        width = 1 if single else 2
-        block = np.array([[value.real, value.imag], [-value.imag, value.real]])[:width, :width]
+    for block in found:
+        width = len(block)
+        value = complex(block[0, 0], block[0, -1] if width > 1 else 0.0)
         rows, columns = inverse[at : at + width] * weights, basis[:, at : at + width] / weights[:, None]
         parts.add(states, block, np.array([value, value.conjugate()])[:width], rows, columns)
         at += width
     return float(np.linalg.cond(basis))
+
+
+def _separated(matrix: Array) -> tuple[Array, Array, list[Array]]:
+    """Real eigenvectors in columns, two for conjugate eigenvalues, their inverse, and the blocks that they make."""
+    values, vectors = np.linalg.eig(matrix)
+    keep = values.imag >= 0.0
+    values, vectors = values[keep], vectors[:, keep]
+    # real and imaginary parts at right angles
+    vectors = vectors * np.exp(-0.5j * np.angle(np.sum(vectors**2, axis=0)))
+    columns: list[Array] = []
+    blocks: list[Array] = []
+    for value, v in zip(values, vectors.T, strict=True):
+        width = 1 if value.imag == 0.0 else 2
+        columns += [v.real, v.imag][:width]
+        blocks.append(np.array([[value.real, value.imag], [-value.imag, value.real]])[:width, :width])
+    basis = np.stack(columns, axis=1)
+    return basis, np.asarray(np.linalg.inv(basis), dtype=float), blocks
 
 
 def _arranged(parts: _Parts, n: int, left: Array, right: Array, active: np.ndarray, rounding: float) -> Blocks:
@@ -231,3 +251,125 @@ def _arranged(parts: _Parts, n: int, left: Array, right: Array, active: np.ndarr
         motion, first, rates[order], decays, steepest, exponents, into, np.ascontiguousarray(out), flexibility,
         flexible, coupling.reshape(len(order), 2, -1), share, int(coupled.sum()), active, rounding,
     )  # fmt: skip
+
+
+class Form(NamedTuple):
+    """The blocks with states while channels have a constant stiffness; S states in B blocks, G channels.
+
+    motion, first, driven, read
+        See `Blocks`: (B, 2, 2), (B + 1,), (S, G), (2, G, S).
+    coupling
+        See `Blocks`, the blocks in a row: (2 G G, 2 B).
+    flexible
+        Of what has no states, (G, G).
+    out, back
+        The states of the free blocks from those of this form, and these from those, (S, S); empty if they are the same.
+    rounding
+        See `Blocks`.
+    """
+
+    motion: Array
+    first: np.ndarray
+    driven: Array
+    read: Array
+    coupling: Array
+    flexible: Array
+    out: Array
+    back: Array
+    rounding: float
+
+
+_SAME = np.empty((0, 0))
+
+
+@lru_cache(maxsize=128)
+def form_of(linear: LinearPart, groups: tuple[Group, ...], dynamic: int, held: tuple[float, ...]) -> Form | None:
+    """The first `dynamic` blocks with the stiffness `held` (G,) at the channels; None where eigenvectors are so nearly
+    parallel that digits would be lost.
+    """
+    blocks = in_blocks(linear, groups)
+    first, size, count = blocks.first[: dynamic + 1], blocks.first[dynamic], len(blocks.active)
+    free = Form(
+        blocks.motion[:dynamic], first, blocks.driven[:size], blocks.read[:, :, :size],
+        _in_a_row(blocks.coupling[:dynamic]), blocks.flexible[dynamic], _SAME, _SAME, 0.0,
+    )  # fmt: skip
+    if not any(held) or not size:
+        return free
+    stiffness, flexible, one = np.diag(held), free.flexible, np.eye(count)
+    raised = np.linalg.inv(one - flexible @ stiffness)
+    matrix = np.zeros((size, size))
+    for b in range(dynamic):
+        s, e = first[b], first[b + 1]
+        matrix[s:e, s:e] = blocks.motion[b, : e - s, : e - s]
+    matrix += free.driven @ (stiffness @ raised @ free.read[0])
+    try:
+        basis, inverse, found = _separated(matrix)
+    except np.linalg.LinAlgError:  # two of them are the same
+        return None
+    condition = float(np.linalg.norm(basis) * np.linalg.norm(inverse))
+    if not condition < _PARALLEL:
+        return None
+    driven = inverse @ free.driven @ np.linalg.inv(one - stiffness @ flexible)
+    read = np.stack((raised @ free.read[0] @ basis, free.read[1] @ basis))
+    motion, coupling, ends = np.zeros((len(found), 2, 2)), np.zeros((len(found), 2, 2 * count * count)), [0]
+    for b, block in enumerate(found):
+        s, e = ends[-1], ends[-1] + len(block)
+        motion[b, : e - s, : e - s] = block
+        coupling[b] = (read[:, :, s:e] @ driven[s:e]).ravel(), (read[:, :, s:e] @ block @ driven[s:e]).ravel()
+        ends.append(e)
+    return Form(
+        motion, np.array(ends), driven, read, _in_a_row(coupling), raised @ flexible, basis, inverse, condition * _EPS
+    )
+
+
+def _in_a_row(coupling: Array) -> Array:
+    blocks, two, pairs = coupling.shape
+    return np.ascontiguousarray(coupling.reshape(two * blocks, pairs).T)
+
+
+class Forms(NamedTuple):
+    """Forms one after the other, R of them: see `Form`, with an index more.
+
+    There are as many blocks as in the form with most: others have blocks without states behind them. `turns` (R + 1, S,
+    S) has the states of each form from those of the one before, the first and what comes after the last being free;
+    `turning` (R + 1,) where these are not the same.
+    """
+
+    motion: Array
+    first: np.ndarray
+    driven: Array
+    read: Array
+    coupling: Array
+    flexible: Array
+    turns: Array
+    turning: np.ndarray
+
+
+@lru_cache(maxsize=32)
+def forms_along(
+    linear: LinearPart, groups: tuple[Group, ...], dynamic: int, sequence: tuple[tuple[float, ...], ...]
+) -> tuple[Forms, np.ndarray, float]:
+    """The forms of a sequence of stiffnesses (G,); where these are within the forms (R,), which are those of the free
+    structure elsewhere; and the largest of their relative errors by rounding.
+    """
+    found = [form_of(linear, groups, dynamic, held) for held in sequence]
+    free = form_of(linear, groups, dynamic, (0.0,) * len(in_blocks(linear, groups).active))
+    assert free is not None
+    within = np.array([form is not None for form in found])
+    chosen = [form or free for form in found]
+    most, size = max(len(form.motion) for form in chosen), len(free.driven)
+    motion, first = np.zeros((len(chosen), most, 2, 2)), np.full((len(chosen), most + 1), size)
+    coupling = np.zeros((len(chosen), len(free.coupling), 2 * most))
+    for r, form in enumerate(chosen):
+        blocks = len(form.motion)
+        motion[r, :blocks], first[r, : blocks + 1] = form.motion, form.first
+        coupling[r, :, : 2 * blocks] = form.coupling
+    steps = list(pairwise([free, *chosen, free]))
+    turning = np.array([old is not new for old, new in steps])
+    turns = np.zeros((len(turning) if turning.any() else 0, size, size))
+    for r in turning.nonzero()[0].tolist():
+        old, new = steps[r]
+        turns[r] = old.out if new is free else new.back if old is free else new.back @ old.out
+    driven, read, flexible = (np.stack([getattr(f, name) for f in chosen]) for name in ("driven", "read", "flexible"))
+    rounding = max(form.rounding for form in chosen)
+    return Forms(motion, first, driven, read, coupling, flexible, turns, turning), within, rounding

@@ -1,7 +1,10 @@
 """What blocks of the linear part make of initial states and of forces on a panel, exactly.
 
 See `propagate` for the formulas: exponentials of blocks in closed form, and their integrals with Lagrange's polynomials
-by Gauss's formula between neighbouring nodes, which holds on panels of any mapping.
+by Gauss's formula between neighbouring nodes, which holds on panels of any mapping. Where a block turns many times
+over a panel that is uniform in time, they are integrated by parts,
+
+    int_0^t exp(L (t - s)) P(s) ds = sum_k L^-(k+1) (exp(L t) P^(k)(0) - P^(k)(t)).
 """
 
 from __future__ import annotations
@@ -17,6 +20,8 @@ from suboctave.floquet.time_mesh import NODES, ORDER
 _FAST = {"reassoc", "contract", "nsz"}
 #: points of Gauss's formula between neighbouring nodes
 _POINTS = 8
+#: phase of a block over a panel from which on integrals by parts lose no digits; that to which Gauss's formula serves
+TURNS = 24.0
 
 
 def _between() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -34,7 +39,14 @@ def _between() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     return np.ascontiguousarray(values), np.ascontiguousarray(until), over[1:] - over[:-1], 0.5 * (right - left) * w
 
 
+def _derivatives() -> np.ndarray:
+    """All derivatives at the nodes from values there, (m, m, m)."""
+    lagrange = [np.polynomial.Polynomial(row) for row in np.linalg.inv(np.vander(NODES, increasing=True)).T]
+    return np.array([[p.deriv(k)(NODES) for p in lagrange] for k in range(ORDER)]).transpose(0, 2, 1).copy()
+
+
 _VALUES, _UNTIL, _WHOLE, _WEIGHTS = _between()
+_DERIVATIVES = _derivatives()
 
 
 @kernel(fastmath=_FAST, error_model="numpy")
@@ -52,23 +64,49 @@ def exponential(mean, square, t):
 
 
 @kernel(fastmath=_FAST, error_model="numpy")
-def _integrals(times, left, rate, mean, square, e, w):
+def _by_parts(length, mean, square, e, w):
+    """w_0, w_1 at the nodes of a uniform panel, see `_integrals`, from e_0, e_1 there."""
+    m = ORDER
+    for l in range(m * m):
+        w[0, l] = w[1, l] = 0.0
+    trace, minus, scale = 2.0 * mean, square - mean * mean, 2.0 / length
+    # L^-1 = (L - trace) / minus, a power more each time
+    x, y = -trace / minus, 1.0 / minus
+    p, q = x, y
+    for k in range(m):
+        for j in range(1, m):
+            u, v = p * e[0, j] + minus * q * e[1, j], p * e[1, j] + q * e[0, j] + trace * q * e[1, j]
+            for l in range(m):
+                first, here = _DERIVATIVES[k, 0, l], _DERIVATIVES[k, j, l]
+                w[0, j * m + l] += u * first - p * here
+                w[1, j * m + l] += v * first - q * here
+        p, q = scale * (p * x + minus * q * y), scale * (p * y + q * x + trace * q * y)
+
+
+@kernel(fastmath=_FAST, error_model="numpy")
+def _integrals(times, left, rate, uniform, mean, square, e, w):
     """e_0, e_1 at the nodes into e (2, m), and w_0, w_1 into w (2, m m), on one panel; mean, square: see `exponential`.
 
     times (m - 1,): between the nodes; left, rate (m - 1, points): time from Gauss's points to the next node, and dt/ds
-    there times their weight.
+    there times their weight; uniform: whether time is linear in s.
     """
     m = ORDER
     e[0, 0], e[1, 0] = 1.0, 0.0
-    for l in range(m):
-        w[0, l] = w[1, l] = 0.0
-    trace, minus = 2.0 * mean, square - mean * mean
+    trace, minus, length = 2.0 * mean, square - mean * mean, 0.0
     for i in range(m - 1):
-        old, new = i * m, (i + 1) * m
         x, y = exponential(mean, square, times[i])
         # (x + y L) (u + v L) with L^2 = trace L + minus
         e[0, i + 1] = x * e[0, i] + minus * y * e[1, i]
         e[1, i + 1] = x * e[1, i] + y * e[0, i] + trace * y * e[1, i]
+        length += times[i]
+    if uniform and math.sqrt(abs(minus)) * length > TURNS:
+        _by_parts(length, mean, square, e, w)
+        return
+    for l in range(m):
+        w[0, l] = w[1, l] = 0.0
+    for i in range(m - 1):
+        old, new = i * m, (i + 1) * m
+        x, y = exponential(mean, square, times[i])
         for l in range(m):
             w[0, new + l] = x * w[0, old + l] + minus * y * w[1, old + l]
             w[1, new + l] = x * w[1, old + l] + y * w[0, old + l] + trace * y * w[1, old + l]
@@ -82,36 +120,38 @@ def _integrals(times, left, rate, mean, square, e, w):
 
 
 @kernel(fastmath=_FAST, error_model="numpy")
-def structure(spans, motion, first, driven, read, coupling, flexible, dynamic):
-    """What the first `dynamic` blocks make of initial states and forces on panels with dt/ds = spans (P, m).
+def structure(spans, stretch, forms):
+    """What blocks make of initial states and forces on panels with dt/ds = spans (P, m).
 
-    motion, first, driven, read, coupling, flexible: see `blocks.Blocks`; S: states of these blocks. Returns which kind
-    each panel is, (P,), a panel like the one before being of the same kind, and for each kind
+    stretch (P,): which of the forms (`blocks.Forms`) each panel has; S states. Returns which kind each panel is, (P,),
+    a panel like the one before being of the same kind, and for each kind
 
     - moved (D, blocks, 2, 2): exp(L t) over the panel
     - reading (D, 2, G m, S): q and q' at the nodes from initial states
     - influence (D, 2, G m, G m): the same from forces at the nodes
     - entering (D, S, G m): final states from forces at the nodes.
     """
+    motion, first, driven, read = forms.motion, forms.first, forms.driven, forms.read
     kinds = np.zeros(spans.shape[0], dtype=np.int64)
     for p in range(1, spans.shape[0]):
-        kinds[p] = kinds[p - 1]
+        kinds[p] = kinds[p - 1] + (1 if stretch[p] != stretch[p - 1] else 0)
         for j in range(spans.shape[1]):
-            if abs(spans[p, j] - spans[p - 1, j]) > 1e-12 * spans[p, j]:
+            if kinds[p] == kinds[p - 1] and abs(spans[p, j] - spans[p - 1, j]) > 1e-12 * spans[p, j]:
                 kinds[p] = kinds[p - 1] + 1
-                break
-    groups, m, size = driven.shape[1], ORDER, first[dynamic]
-    count = kinds[-1] + 1
-    moved, reading = np.zeros((count, dynamic, 2, 2)), np.empty((count, 2, groups * m, size))
+    size, groups = driven.shape[1:]
+    m, most, count = ORDER, motion.shape[1], kinds[-1] + 1
+    moved, reading = np.zeros((count, most, 2, 2)), np.empty((count, 2, groups * m, size))
     influence, entering = np.empty((count, 2, groups * m, groups * m)), np.empty((count, size, groups * m))
     times, left, rate = np.empty(m - 1), np.empty((m - 1, _POINTS)), np.empty((m - 1, _POINTS))
-    e, w, sums = np.empty((2, m)), np.empty((2, m * m)), np.empty((2 * groups * groups, m * m))
+    e, w, sums = np.empty((2, m)), np.empty((2 * most, m * m)), np.zeros((2 * groups * groups, m * m))
     turned = np.empty(2)
     for p in range(spans.shape[0]):
-        d = kinds[p]
+        d, r = kinds[p], stretch[p]
         if p > 0 and d == kinds[p - 1]:
             continue
+        uniform = True
         for i in range(m - 1):
+            uniform = uniform and abs(spans[p, i + 1] - spans[p, 0]) <= 1e-12 * spans[p, 0]
             times[i] = 0.0
             for l in range(m):
                 times[i] += _WHOLE[i, l] * spans[p, l]
@@ -120,34 +160,34 @@ def structure(spans, motion, first, driven, read, coupling, flexible, dynamic):
                 for l in range(m):
                     left[i, g] += _UNTIL[i, g, l] * spans[p, l]
                     rate[i, g] += _VALUES[i, g, l] * spans[p, l] * _WEIGHTS[i, g]
-        for i in range(sums.shape[0]):
-            for l in range(m * m):
-                sums[i, l] = 0.0
-        for b in range(dynamic):
-            s, wide = first[b], first[b + 1] - first[b]
-            mean = 0.5 * (motion[b, 0, 0] + motion[b, 1, 1])
-            half = 0.5 * (motion[b, 0, 0] - motion[b, 1, 1])
-            _integrals(times, left, rate, mean, half * half + motion[b, 0, 1] * motion[b, 1, 0], e, w)
-            for i in range(sums.shape[0]):
-                once, twice = coupling[b, 0, i], coupling[b, 1, i]
-                for l in range(m * m):
-                    sums[i, l] += once * w[0, l] + twice * w[1, l]
+        for b in range(most):
+            s, wide, v = first[r, b], first[r, b + 1] - first[r, b], w[2 * b : 2 * b + 2]
+            if wide == 0:
+                # behind the last block
+                v[:] = 0.0
+                continue
+            # one number counts as a double one
+            mean = 0.5 * (motion[r, b, 0, 0] + motion[r, b, wide - 1, wide - 1])
+            half = 0.5 * (motion[r, b, 0, 0] - motion[r, b, wide - 1, wide - 1])
+            _integrals(times, left, rate, uniform, mean, half * half + motion[r, b, 0, 1] * motion[r, b, 1, 0], e, v)
             for i in range(wide):
                 for k in range(wide):
-                    moved[d, b, i, k] = e[1, m - 1] * motion[b, i, k] + (e[0, m - 1] if i == k else 0.0)
+                    moved[d, b, i, k] = e[1, m - 1] * motion[r, b, i, k] + (e[0, m - 1] if i == k else 0.0)
                 for g in range(groups):
                     turned[0] = turned[1] = 0.0
                     for k in range(wide):
-                        turned[0] += motion[b, i, k] * driven[s + k, g]
+                        turned[0] += motion[r, b, i, k] * driven[r, s + k, g]
                     for j in range(m):
                         l = (m - 1) * m + j
-                        entering[d, s + i, g * m + j] = w[0, l] * driven[s + i, g] + w[1, l] * turned[0]
+                        entering[d, s + i, g * m + j] = v[0, l] * driven[r, s + i, g] + v[1, l] * turned[0]
                     for part in range(2):
                         turned[1] = 0.0
                         for k in range(wide):
-                            turned[1] += read[part, g, s + k] * motion[b, k, i]
+                            turned[1] += read[r, part, g, s + k] * motion[r, b, k, i]
                         for j in range(m):
-                            reading[d, part, g * m + j, s + i] = e[0, j] * read[part, g, s + i] + e[1, j] * turned[1]
+                            reading[d, part, g * m + j, s + i] = e[0, j] * read[r, part, g, s + i] + e[1, j] * turned[1]
+        if groups > 0 and most > 0:
+            np.dot(forms.coupling[r], w, sums)
         for part in range(2):
             for g in range(groups):
                 for h in range(groups):
@@ -156,5 +196,5 @@ def structure(spans, motion, first, driven, read, coupling, flexible, dynamic):
                             value = sums[(part * groups + g) * groups + h, j * m + l]
                             influence[d, part, g * m + j, h * m + l] = value
                         if part == 0:
-                            influence[d, 0, g * m + j, h * m + j] += flexible[dynamic, g, h]
+                            influence[d, 0, g * m + j, h * m + j] += forms.flexible[r, g, h]
     return kinds, moved, reading, influence, entering

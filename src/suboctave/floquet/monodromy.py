@@ -1,7 +1,8 @@
 """Stability of a periodic motion from its monodromy matrix.
 
 The linearised motion `M y'' + (C + sum f_v d d^T) y' + (K + sum f_u d d^T) y = 0` is propagated over one period on
-panels that follow the laws (`time_mesh`, `propagate`), in modes of the linear part, or blocks of such (`blocks`):
+panels that follow the laws (`time_mesh`, `propagate`), in modes of the linear part, or blocks of such (`blocks`), with
+the constant stiffnesses of contacts in them:
 
     y'' + C y' + K y = - sum_g left_g (k_g q_g + c_g q_g' + r_g),    q_g = right_g^T y,
 
@@ -44,10 +45,10 @@ import numpy as np
 import scipy.linalg
 from scipy.linalg import lapack
 
-from suboctave.floquet.blocks import in_blocks
-from suboctave.floquet.exponentials import structure
+from suboctave.floquet.blocks import forms_along, in_blocks
+from suboctave.floquet.exponentials import TURNS, structure
 from suboctave.floquet.propagate import closed, march, multipliers_and_shifts, response
-from suboctave.floquet.resolution import ACCURACY, longest_rest, parts_needed
+from suboctave.floquet.resolution import ACCURACY, longest_rest, parts_needed, states_needed
 from suboctave.floquet.result import FloquetResult
 from suboctave.floquet.time_mesh import (
     NODES,
@@ -69,9 +70,11 @@ from suboctave.harmonic.quadrature import search_grid, singular_instants
 from suboctave.interruption import check_time
 
 #: how far blocks without states may move multipliers, and how much further where a force is left unbalanced altogether,
-#: which does more; longest panels in units of the time scales of the forces, of the blocks as channels see them, and of
-#: the blocks; how much less these count if they are seen little, as a power: with them multipliers are good for 1e-8
-_LIMITS = (1e-4, 1e-2, 1.2, 1.8, 24.0, 1.0 / 12.0)
+#: which does more
+_NEGLECTED = (1e-4, 1e-2)
+#: longest panels in units of the time scales of the forces, of the blocks as channels see them, and of the blocks; how
+#: much less these count if they are seen little, as a power: with them multipliers are good for 1e-8
+_LENGTHS = (1.2, 1.8, TURNS, 1.0 / 12.0)
 #: logarithm of what is left of states that count no more: they need not be followed
 _FORGOTTEN = math.log(1e-14)
 #: most panels that a period is cut into for that
@@ -99,12 +102,14 @@ class _Linearised:
         dt/ds on every panel, (P, ORDER).
     path, law, base
         See `time_mesh.along_panels`, with the elements that are not known in closed form.
+    loose
+        What of `base` is not within the forms of the structure.
     active
         The channels with a force, (A,).
     coupled
         Whether any channel has stiffness or damping.
-    neglected, rounding
-        How far blocks without states may move multipliers, relative to the largest; see `blocks.Blocks`.
+    neglected
+        How far blocks without states may move multipliers, relative to the largest.
     before
         Monodromy matrix along the motion as it stands, (size, size).
     """
@@ -114,7 +119,6 @@ class _Linearised:
         self.state = state
         own = self._own = Channels(state)
         self._blocks = blocks = in_blocks(state.linear, balance.all_groups)
-        self.rounding = blocks.rounding
         self._laws = laws = PackedLaws(state.laws.groups, own.probes) if own.probes else state.packed
         self._motions, self._forces, self.active = state.motions, state.force_spectra, blocks.active
         if own.probes:
@@ -161,10 +165,7 @@ class _Linearised:
             lasting = blocks.decays[:dynamic] * rest >= _FORGOTTEN
             self._kept = np.flatnonzero(np.repeat(lasting, np.diff(blocks.first[: dynamic + 1])))
         self.size = size = len(self._kept)
-        self._structures = structure(
-            self.spans, blocks.motion, blocks.first, blocks.driven, blocks.read, blocks.coupling, blocks.flexible,
-            dynamic,
-        )  # fmt: skip
+        self._structures = structure(self.spans, self._stretch, self._forms)
         self._acting = np.empty((len(self.spans), channels), dtype=bool)
         self._solved = np.empty((len(self.spans), channels * ORDER, size + 1))
         self._whole = self._march(self.law, np.zeros(self.base.shape), size + 1)
@@ -182,21 +183,39 @@ class _Linearised:
             laws.step_owner, laws.line, self.spans, self.path, self.law, self.base,
         )  # fmt: skip
         self._own.evaluate(self.path, self.law)
+        blocks, resolved = self._blocks, (self.state.basis.harmonics + 0.5) * self.state.rate
+        self._dynamic, self.neglected, self.coupled = states_needed(
+            self.spans, self._forces, self.law, self.base, self.active, self._most, self._held, blocks.rates,
+            blocks.decays, blocks.flexibility, blocks.share[0], blocks.first, blocks.coupled, resolved, _NEGLECTED,
+        )  # fmt: skip
+        self._form()
         parts: np.ndarray
         total: float
-        blocks, resolved = self._blocks, (self.state.basis.harmonics + 0.5) * self.state.rate
-        parts, total, self._dynamic, self.neglected, self.coupled = parts_needed(
-            self.spans, self._forces, self.law, self.base, self.active, self._most, self._held, blocks.rates,
-            blocks.decays, blocks.flexibility, blocks.share, blocks.first, blocks.coupled, resolved, _LIMITS,
+        parts, total = parts_needed(
+            self.spans, self.law, self.loose, self.active, blocks.rates, blocks.flexibility,
+            blocks.share[1, blocks.first[self._dynamic]], self._dynamic, self.neglected, _LENGTHS,
         )  # fmt: skip
         return parts, total
+
+    def _form(self) -> None:
+        """The forms of the structure along the panels, and what of the stiffness of the pieces is not within them."""
+        held, self._stretch = self.base[self.active], np.zeros(len(self.spans), dtype=np.int64)
+        begins = np.zeros(1, dtype=np.int64)
+        if held.any():
+            changes = (held[:, 1:] != held[:, :-1]).any(axis=0)
+            self._stretch[1:] = changes.cumsum()
+            begins = np.append(0, changes.nonzero()[0] + 1)
+        sequence = tuple(map(tuple, held[:, begins].T.tolist()))
+        groups = self.state.balance.all_groups
+        self._forms, within, self._turned = forms_along(self.state.linear, groups, self._dynamic, sequence)
+        self.loose = self.base * ~within[self._stretch] if not within.all() else np.zeros_like(self.base)
 
     def _march(self, law: Array, kick: Array, columns: int) -> Array:
         """States at the end of the period, (S, columns); see `propagate.march`."""
         blocks = self._blocks
         total = np.zeros((blocks.first[self._dynamic], columns))
         march(
-            self._structures, blocks.first, blocks.driven, law, self.base, kick, self.active, total, self._kept,
+            self._structures, self._stretch, self._forms, law, self.loose, kick, self.active, total, self._kept,
             self._acting, self._solved,
         )  # fmt: skip
         return total
@@ -214,6 +233,11 @@ class _Linearised:
         self._own.changed(self.path, change, law, self.spans)
         return law, kick
 
+    @property
+    def rounding(self) -> float:
+        """Relative errors of multipliers due to eigenvectors that are nearly parallel."""
+        return self._blocks.rounding + self._turned
+
     def others(self) -> tuple[ComplexArray, Array]:
         """Multipliers of what has no states at the beginning, as if no channel acted, and how far those may move
         them.
@@ -228,7 +252,7 @@ class _Linearised:
         by_stiffness, by_damping = (flexible @ held for held in self._held)
         by_forces = 2.0 * blocks.rates * (by_stiffness + blocks.rates * by_damping)
         moved = np.repeat(np.expm1(np.minimum(by_forces, 1.0)), np.diff(blocks.first))[without]
-        moved += 1e-15 * np.abs(exponents) + blocks.rounding
+        moved += 1e-15 * np.abs(exponents) + self.rounding
         return mu, np.abs(mu) * moved + math.exp(_FORGOTTEN)
 
     def multipliers(self, weight: float) -> tuple[ComplexArray, Array, float]:
@@ -242,8 +266,8 @@ class _Linearised:
             if weight < 1.0:
                 start = start - (1.0 - weight) * (projector(self.before) @ start)
             share = response(
-                self._structures, self._blocks.first, self.active, self._acting, self._solved, start, self._whole,
-                self._kept, self.path, _LARGEST, change,
+                self._structures, self._stretch, self._forms, self.active, self._acting, self._solved, start,
+                self._whole, self._kept, self.path, _LARGEST, change,
             )  # fmt: skip
         law, kick = self._changed(change)
         after = self._march(law, kick, self.size)[self._kept]

@@ -10,11 +10,12 @@ nodes, and between the nodes the blocks move as they do:
 
     z(t_j) = exp(L t_j) z_0 + sum_l W_jl B F_l,    W_jl = int_0^t_j exp(L (t_j - t)) P_l(t) dt = w_0 + w_1 L,
 
-P_l Lagrange's polynomials, the integrals by Gauss's formula between neighbouring nodes. Panels are as long as
-polynomials follow the forces, whatever the blocks do. `structure` (`exponentials`) has these matrices, the same on all
-panels of one length. `march` then solves for the forces of the channels that act on a panel, a system as large as these
-have nodes; where none acts the blocks just go on. With forces as polynomials the method is of order 12 at a panel's
-end, as Lobatto IIIA is (Hairer & Wanner, Solving Ordinary Differential Equations II, section IV.5), and exact without.
+P_l Lagrange's polynomials. Panels are as long as polynomials follow the forces, whatever the blocks do. `structure`
+(`exponentials`) has these matrices, the same on all panels of one length. `march` then solves for the forces of the
+channels that act on a panel, a system as large as these have nodes; where none acts the blocks just go on. Constant
+stiffnesses of contacts are within the blocks (`blocks.Form`): as contacts begin and end, the states of one form become
+those of the next. With forces as polynomials the method is of order 12 at a panel's end, as Lobatto IIIA is (Hairer &
+Wanner, Solving Ordinary Differential Equations II, section IV.5), and exact without.
 """
 
 from __future__ import annotations
@@ -70,6 +71,8 @@ def _turn(moved, first, start, stop, state):
     """The columns from start to stop of the states (S, .) moved on, in place; moved (blocks, 2, 2)."""
     for b in range(moved.shape[0]):
         s = first[b]
+        if first[b + 1] == s:
+            break
         if first[b + 1] - s == 1:
             for j in range(start, stop):
                 state[s, j] *= moved[b, 0, 0]
@@ -78,22 +81,6 @@ def _turn(moved, first, start, stop, state):
                 x, y = state[s, j], state[s + 1, j]
                 state[s, j] = moved[b, 0, 0] * x + moved[b, 0, 1] * y
                 state[s + 1, j] = moved[b, 1, 0] * x + moved[b, 1, 1] * y
-
-
-@kernel(fastmath=_FAST, error_model="numpy")
-def _add_product(a, rows, count, b, depth, out):
-    """Add the product of chosen rows of a, count of them, and b, depth rows, to out; four terms at a time."""
-    width = b.shape[1]
-    whole = depth - depth % 4
-    for i in range(count):
-        row = a[rows[i]]
-        for k in range(0, whole, 4):
-            p, q, r, s = row[k], row[k + 1], row[k + 2], row[k + 3]
-            for j in range(width):
-                out[i, j] += p * b[k, j] + q * b[k + 1, j] + r * b[k + 2, j] + s * b[k + 3, j]
-        for k in range(whole, depth):
-            for j in range(width):
-                out[i, j] += row[k] * b[k, j]
 
 
 @kernel(fastmath=_FAST, error_model="numpy")
@@ -108,7 +95,7 @@ def _lower(values, row):
 
 
 @kernel(fastmath=_FAST, error_model="numpy")
-def _tangents(law, base, active, p, forced, values, acts, rows):
+def _tangents(law, loose, active, p, forced, values, acts, rows):
     """Forces, stiffness and damping at the nodes of panel p into values (3, G m), which channels act there into acts
     (G,), and their nodes into rows; returns how many these are, and whether any has damping.
     """
@@ -118,14 +105,13 @@ def _tangents(law, base, active, p, forced, values, acts, rows):
         for j in range(m):
             for part in range(3):
                 values[part, row + j] = law[active[g], part, p * (m - 1) + j]
-            values[1, row + j] += base[active[g], p]
+            values[1, row + j] += loose[active[g], p]
             stiff, moves = stiff or values[1, row + j] != 0.0, moves or values[2, row + j] != 0.0
         acts[g], moving = stiff or moves, moving or moves
         for j in range(m if acts[g] else 0):
             rows[count] = row + j
             count += 1
         if forced:
-            _lower(values[0], row)
             if stiff:
                 _lower(values[1], row)
             if moves:
@@ -134,16 +120,19 @@ def _tangents(law, base, active, p, forced, values, acts, rows):
 
 
 @kernel(fastmath=_FAST, error_model="numpy")
-def _solve(reading, influence, total, values, acts, rows, count, moving, forced, a, f, speed):
-    """Forces at the nodes `rows`, count of them, into f, from states `total` at a panel's start; a, speed: space."""
-    size, columns = total.shape
+def _solve(reading, influence, total, values, acts, rows, count, moving, forced, a, seen, f, speed):
+    """Forces at the nodes `rows`, count of them, into f, from states `total` at a panel's start; a, seen and speed are
+    room to work in.
+    """
+    columns = total.shape[1]
     r, k, c = values[0], values[1], values[2]
     for i in range(count):
-        for j in range(columns):
-            f[i, j] = speed[i, j] = 0.0
-    _add_product(reading[0], rows, count, total, size, f)
+        seen[i] = reading[0, rows[i]]
+    np.dot(seen[:count], total, f[:count])
     if moving:
-        _add_product(reading[1], rows, count, total, size, speed)
+        for i in range(count):
+            seen[i] = reading[1, rows[i]]
+        np.dot(seen[:count], total, speed[:count])
     for i in range(count):
         row = rows[i]
         for j in range(columns):
@@ -165,16 +154,28 @@ def _solve(reading, influence, total, values, acts, rows, count, moving, forced,
 
 
 @kernel(fastmath=_FAST, error_model="numpy")
-def march(structures, first, driven, law, base, kick, active, total, kept, acting, solved):
+def _kick(amount, read, driven, total):
+    """Add impulses, so many times what is read of the states (S, .), to these."""
+    for j in range(total.shape[1]):
+        q = 0.0
+        for s in range(total.shape[0]):
+            q += read[s] * total[s, j]
+        for s in range(total.shape[0]):
+            total[s, j] += amount * q * driven[s]
+
+
+@kernel(fastmath=_FAST, error_model="numpy")
+def march(structures, stretch, forms, law, loose, kick, active, total, kept, acting, solved):
     """Perturbations along the panels of one period, and with them the response to the forces r.
 
     Parameters
     ----------
-    structures, first, driven
+    structures, stretch, forms
         See `structure`.
-    law, base, kick
+    law, loose, kick
         Forces, stiffness and damping of all channels at the nodes of the period, (C, >= 3, N); what is added to the
-        stiffness on every panel, (C, P); impulses `-kick q` at the beginnings of panels, (C, P).
+        stiffness on every panel and is not within the forms, (C, P); impulses `-kick q` at the beginnings of panels,
+        (C, P).
     active
         The channels that act, (G,).
     total
@@ -187,7 +188,7 @@ def march(structures, first, driven, law, base, kick, active, total, kept, actin
 
     Notes
     -----
-    With r, laws are polynomials of lower degree on panels.
+    With r, stiffness and damping are polynomials of lower degree on panels.
     """
     kinds, moved, reading, influence, entering = structures
     groups, m, (size, columns) = active.shape[0], ORDER, total.shape
@@ -197,30 +198,34 @@ def march(structures, first, driven, law, base, kick, active, total, kept, actin
         total[kept[i], i] = 1.0
     values, acts, rows = np.empty((3, forces)), np.empty(groups, dtype=np.bool_), np.empty(forces, dtype=np.int64)
     a, f, speed = np.empty((forces, forces)), np.empty((forces, columns)), np.empty((forces, columns))
-    all_rows, packed = np.arange(size), np.empty((size, max(forces, 1)))
-    waiting, later = moved[0].copy(), False
+    seen, packed, added = np.empty((forces, size)), np.empty(size * forces), np.empty((size, columns))
+    waiting, later, now = moved[0].copy(), False, -1
     for p in range(kinds.shape[0]):
-        d, kicked = kinds[p], False
+        d, kicked, begins = kinds[p], False, stretch[p] != now
         for channel in active:
             kicked = kicked or kick[channel, p] != 0.0
-        count, moving = _tangents(law, base, active, p, forced, values, acts, rows)
-        if later and (kicked or count > 0):
-            _turn(waiting, first, 0, free, total)
+        count, moving = _tangents(law, loose, active, p, forced, values, acts, rows)
+        if later and (kicked or begins or count > 0):
+            _turn(waiting, forms.first[now], 0, free, total)
             later = False
+        if begins:
+            now = stretch[p]
+            if forms.turning[now]:
+                np.dot(forms.turns[now], total, added)
+                total[:] = added
+        first, driven = forms.first[now], forms.driven[now]
         for g in range(groups if kicked else 0):
-            for j in range(columns if kick[active[g], p] != 0.0 else 0):
-                q = 0.0
-                for s in range(size):
-                    q += reading[d, 0, g * m, s] * total[s, j]
-                for s in range(size):
-                    total[s, j] += kick[active[g], p] * q * driven[s, g]
+            if kick[active[g], p] != 0.0:
+                _kick(kick[active[g], p], reading[d, 0, g * m], driven[:, g], total)
         if count > 0:
-            _solve(reading[d], influence[d], total, values, acts, rows, count, moving, forced, a, f, speed)
+            _solve(reading[d], influence[d], total, values, acts, rows, count, moving, forced, a, seen, f, speed)
             _turn(moved[d], first, 0, columns, total)
+            into = packed[: size * count].reshape(size, count)
             for s in range(size):
                 for l in range(count):
-                    packed[s, l] = entering[d, s, rows[l]]
-            _add_product(packed, all_rows, size, f, count, total)
+                    into[s, l] = entering[d, s, rows[l]]
+            np.dot(into, f[:count], added)
+            total += added
             for i in range(count if forced else 0):
                 for j in range(columns):
                     solved[p, rows[i], j] = f[i, j]
@@ -236,21 +241,24 @@ def march(structures, first, driven, law, base, kick, active, total, kept, actin
                 for s in range(size):
                     total[s, free] += entering[d, s, l] * values[0, l]
     if later:
-        _turn(waiting, first, 0, free, total)
+        _turn(waiting, forms.first[now], 0, free, total)
+    if forms.turning[now + 1]:
+        np.dot(forms.turns[now + 1], total, added)
+        total[:] = added
 
 
 @kernel(fastmath=_FAST, error_model="numpy")
-def response(structures, first, active, acting, solved, start, whole, kept, path, largest, out):
+def response(structures, stretch, forms, active, acting, solved, start, whole, kept, path, largest, out):
     """q, q' at the nodes along all channels into `out` (C, 2, N), which is zero, of the response that begins with the
     kept states `start` (kept, 1); returns the share of it that is left: none is larger than `largest` times the
     displacement.
 
-    structures, first, active, acting, solved: see `march`; whole (S, kept + 1): states at the end of the period, kept
-    (kept,): which of them these are; path (C, 2, N): the motion along all channels.
+    structures, stretch, forms, active, acting, solved: see `march`; whole (S, kept + 1): states at the end of the
+    period, kept (kept,): which of them these are; path (C, 2, N): the motion along all channels.
     """
     kinds, moved, reading, influence, entering = structures
     groups, m, free, size = active.shape[0], ORDER, start.shape[0], whole.shape[0]
-    state, force = np.empty((size, 1)), np.empty(groups * m)
+    state, force, now = np.empty((size, 1)), np.empty(groups * m), -1
     for s in range(size):
         state[s, 0] = whole[s, free]
         for i in range(free):
@@ -259,6 +267,10 @@ def response(structures, first, active, acting, solved, start, whole, kept, path
         state[kept[i], 0] = start[i, 0]
     for p in range(kinds.shape[0]):
         d = kinds[p]
+        if stretch[p] != now:
+            now = stretch[p]
+            if forms.turning[now]:
+                state = np.dot(forms.turns[now], state)
         for row in range(groups * m):
             force[row] = solved[p, row, free]
             for i in range(free if acting[p, row // m] else 0):
@@ -272,7 +284,7 @@ def response(structures, first, active, acting, solved, start, whole, kept, path
                     value += influence[d, part, row, l] * force[l]
                 # the last node of a panel is the first of the next
                 out[active[row // m], part, p * (m - 1) + row % m] = value
-        _turn(moved[d], first, 0, 1, state)
+        _turn(moved[d], forms.first[now], 0, 1, state)
         for s in range(size):
             for l in range(groups * m):
                 state[s, 0] += entering[d, s, l] * force[l]

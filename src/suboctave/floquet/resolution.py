@@ -88,62 +88,82 @@ def with_states(most, held, rates, decays, flexibility, reach, first, coupled, r
 
 
 @kernel()
-def parts_needed(
-    spans, forces, law, base, active, most, held, rates, decays, flexibility, share, first, coupled, resolved, limits
+def states_needed(
+    spans, forces, law, base, active, most, held, rates, decays, flexibility, reach, first, coupled, resolved, limits
 ):  # fmt: skip
-    """Into how many parts panels with dt/ds = spans (P, m) have to be cut, (P,), how many there are then, a float, what
-    `with_states` says, and whether any channel acts.
+    """What `with_states` says of a motion on panels with dt/ds = spans (P, m), and whether any channel acts.
 
-    forces (C, .): Fourier coefficients of all channels; law, base, active: see `march`; rates, ..., resolved: see
-    `with_states`. limits: how far blocks without states may move multipliers, and how much further where the motion
-    leaves all of a force unbalanced; lengths of parts in units of the fastest time scale of the forces, of that of the
-    blocks as channels see them, and of that of the blocks; the power of the share of a block in a force with which it
-    counts for the second. Into most, held (2, G): see `with_states`; most has what channels can have elsewhere.
+    forces (C, .): Fourier coefficients of all channels; law, base (C, P): forces, stiffness and damping at the nodes,
+    and what is added to the stiffness on every panel; active: the channels that act; most, held (2, G): see
+    `with_states`; most has what channels can have elsewhere; rates, ..., resolved: see there. limits: how far blocks
+    without states may move multipliers, and how much further where the motion leaves all of a force unbalanced.
     """
     panels, m = spans.shape
-    groups = active.shape[0]
-    k, c, lengths, time = np.zeros((groups, panels)), np.zeros((groups, panels)), np.zeros(panels), 0.0
+    left, whole, time, acting = 0.0, _TINY, 0.0, False
+    held[:] = 0.0
     for p in range(panels):
+        length = 0.0
         for j in range(m):
-            lengths[p] += WEIGHTS[j] * spans[p, j]
-        time += lengths[p]
-    left, whole, acting = 0.0, _TINY, False
-    for g in range(groups):
-        channel, size = active[g], 0.0
-        held[0, g] = held[1, g] = 0.0
-        for p in range(panels):
+            length += WEIGHTS[j] * spans[p, j]
+        time += length
+        for g in range(active.shape[0]):
+            k = c = 0.0
             for j in range(p * (m - 1), p * (m - 1) + m):
-                k[g, p] = max(k[g, p], abs(law[channel, 1, j] + base[channel, p]))
-                c[g, p] = max(c[g, p], abs(law[channel, 2, j]))
-                left = max(left, abs(law[channel, 0, j]))
-            most[0, g], most[1, g] = max(most[0, g], k[g, p]), max(most[1, g], c[g, p])
-            held[0, g] += k[g, p] * lengths[p]
-            held[1, g] += c[g, p] * lengths[p]
+                k = max(k, abs(law[active[g], 1, j] + base[active[g], p]))
+                c = max(c, abs(law[active[g], 2, j]))
+                left = max(left, abs(law[active[g], 0, j]))
+            most[0, g], most[1, g] = max(most[0, g], k), max(most[1, g], c)
+            held[0, g] += k * length
+            held[1, g] += c * length
+    for g in range(active.shape[0]):
+        size = 0.0
         for h in range(forces.shape[1]):
-            size += abs(forces[channel, h])
+            size += abs(forces[active[g], h])
         whole = max(whole, size)
         acting = acting or held[0, g] > 0.0 or held[1, g] > 0.0
     tolerable = limits[0] + limits[1] * min(1.0, left / whole)
     dynamic, neglected = with_states(
-        most, held, rates, decays, flexibility, share[0], first, coupled, resolved, time, tolerable
+        most, held, rates, decays, flexibility, reach, first, coupled, resolved, time, tolerable
     )
+    return dynamic, neglected, acting
+
+
+@kernel()
+def parts_needed(spans, law, loose, active, rates, flexibility, stiffening, dynamic, neglected, limits):
+    """Into how many parts panels with dt/ds = spans (P, m) have to be cut, (P,), and how many there are then, a float.
+
+    law, loose, active: see `march`; rates, flexibility: see `blocks.Blocks`; stiffening (G,): how much an impulse of
+    stiffness in a channel adds to squared rates; dynamic, neglected: see `with_states`. limits: lengths of parts in
+    units of the fastest time scale of the forces, of that of the blocks as channels see them, and of that of the blocks
+    where panels are not uniform; the power of the share of a block in a force with which it counts for the second.
+    """
+    panels, m = spans.shape
+    # panels need not be much better than what is neglected
+    seeing = limits[1] * max(1.0, _FINER * neglected / ACCURACY) ** 0.1
     fastest = rates[dynamic - 1] if dynamic > 0 else 0.0
-    # panels need not be much better than that
-    seeing = limits[3] * max(1.0, _FINER * neglected / ACCURACY) ** 0.1
     parts, total = np.ones(panels, dtype=np.int64), 0.0
+    k, c = np.empty(active.shape[0]), np.empty(active.shape[0])
     for p in range(panels):
-        a = rate = sight = 0.0
-        for g in range(groups):
-            a += share[1, first[dynamic], g] * k[g, p]
-            rate += share[1, first[dynamic], g] * c[g, p]
-        for b in range(dynamic):
+        a = rate = sight = length = 0.0
+        for j in range(m):
+            length += WEIGHTS[j] * spans[p, j]
+        for g in range(active.shape[0]):
+            k[g] = c[g] = 0.0
+            for j in range(p * (m - 1), p * (m - 1) + m):
+                k[g] = max(k[g], abs(law[active[g], 1, j] + loose[active[g], p]))
+                c[g] = max(c[g], abs(law[active[g], 2, j]))
+            a += stiffening[g] * k[g]
+            rate += stiffening[g] * c[g]
+        for b in range(dynamic if a > 0.0 or rate > 0.0 else 0):
             seen = 0.0
-            for g in range(groups):
-                seen += (k[g, p] + c[g, p] * rates[b]) * abs(flexibility[b, g, g])
+            for g in range(active.shape[0]):
+                seen += (k[g] + c[g] * rates[b]) * abs(flexibility[b, g, g])
             if seen > 0.0:
-                sight = max(sight, rates[b] * min(1.0, seen) ** limits[5])
-        wanted = math.ceil(lengths[p] * max((math.sqrt(a) + rate) / limits[2] + sight / seeing, fastest / limits[4]))
-        total += wanted
+                sight = max(sight, rates[b] * min(1.0, seen) ** limits[3])
+        uniform = abs(spans[p, 0] - spans[p, m // 2]) <= 1e-12 * spans[p, 0]
+        turning = 0.0 if uniform else fastest / limits[2]
+        wanted = math.ceil(length * max((math.sqrt(a) + rate) / limits[0] + sight / seeing, turning))
+        total += max(wanted, 1.0)
         # no more than a number of parts: beyond a million nothing is cut
         parts[p] = int(min(wanted, 1e6)) if wanted >= 1.0 else 1
-    return parts, total, dynamic, neglected, acting
+    return parts, total
