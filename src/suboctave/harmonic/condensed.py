@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
+from suboctave.compiled import kernel
 from suboctave.errors import ConvergenceError, InputError, shortened
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices, in_words, natural_frequencies
@@ -70,10 +71,21 @@ class Blocks(NamedTuple):
         return Blocks(_transposed(self.qq), _transposed(self.zq), _transposed(self.qz), zz)
 
 
+@kernel()
+def _dynamic(entries, frequency, order, out):
+    """`K - Omega^2 M + i Omega C` into `out` (F, .), differentiated by Omega; entries (3, .): M, C, K."""
+    for f in range(frequency.shape[0]):
+        w = frequency[f]
+        inertia = -w * w if order == 0 else -2.0 * w if order == 1 else -2.0
+        damping, static = w if order == 0 else 1.0 if order == 1 else 0.0, 1.0 if order == 0 else 0.0
+        for i in range(entries.shape[1]):
+            out[f, i] = complex(static * entries[2, i] + inertia * entries[0, i], damping * entries[1, i])
+
+
 class Stack(NamedTuple):
     """M, C, K in the coordinates (q, z), all entries in a row, (3, .); how many q and z; if zz is a diagonal."""
 
-    entries: ComplexArray
+    entries: Array
     sizes: tuple[int, int]
     diagonal: bool
 
@@ -84,15 +96,13 @@ class Stack(NamedTuple):
         if diagonal:
             parts = [(*part[:3], part[3].diagonal()) for part in parts]
         rows = [np.concatenate([one.ravel() for one in part]) for part in parts]
-        return cls(np.array(rows, dtype=complex), parts[0][1].shape, diagonal)
+        return cls(np.array(rows), parts[0][1].shape, diagonal)
 
     def at(self, frequency: Array, order: int) -> Blocks:
         """`K - Omega^2 M + i Omega C` at frequencies, differentiated by Omega."""
-        w, factors = frequency, np.zeros((len(frequency), 3), dtype=complex)
-        factors[:, 0] = -w * w if order == 0 else -2.0 * w if order == 1 else -2.0
-        factors[:, 1] = 1j * w if order == 0 else 1j if order == 1 else 0.0
-        factors[:, 2] = 1.0 if order == 0 else 0.0
-        values, (m, s), count = factors @ self.entries, self.sizes, len(frequency)
+        (m, s), count = self.sizes, len(frequency)
+        values = np.empty((count, self.entries.shape[1]), dtype=complex)
+        _dynamic(self.entries, frequency, order, values)
         a, b, c = m * m, m * m + m * s, m * m + 2 * m * s
         inner = values[:, c:] if self.diagonal else values[:, c:].reshape(count, s, s)
         return Blocks(
@@ -237,9 +247,10 @@ class Condensed:
         """Z at frequencies, `Z_zz^-1 Z_zq`, and the transpose of `Z_qz Z_zz^-1`; what was asked for last is kept."""
         if self._last is None or self._last[0] is not frequency:
             whole = self._own.at(frequency, 0)
-            right = whole.solved(whole.zq)
-            turned = whole.transposed()
-            left = right if self._symmetric else turned.solved(turned.zq)
+            left = right = whole.solved(whole.zq)
+            if not self._symmetric:
+                turned = whole.transposed()
+                left = turned.solved(turned.zq)
             self._last = frequency, (whole, right, left)
         return self._last[1]
 
@@ -251,13 +262,12 @@ class Condensed:
             return result
         names = tuple(name for one, _ in by for name in one)
         total = self._blocks(frequency, names, sum(order for _, order in by))
-        first = [self._blocks(frequency, *one) for one in by]
-        result = np.zeros_like(whole.qq)
+        result = np.zeros_like(whole.qq) if total is None else total.qq - total.qz @ right
         if total is not None:
-            result += total.qq - total.qz @ right + _transposed(left) @ (total.inner(right) - total.zq)
-        elif len(by) == 1:
-            return None
-        changes = [one for one in first if one is not None]
+            result += _transposed(left) @ (total.inner(right) - total.zq)
+        if len(by) == 1:
+            return None if total is None else result
+        changes = [blocks for one in by if (blocks := self._blocks(frequency, *one)) is not None]
         if len(changes) == 2:
             (left_a, right_a), (left_b, right_b) = (
                 (one.transposed().zq - one.transposed().inner(left), one.zq - one.inner(right)) for one in changes
