@@ -48,7 +48,7 @@ from scipy.linalg import lapack
 from suboctave.floquet.blocks import forms_along, in_blocks
 from suboctave.floquet.exponentials import TURNS, structure
 from suboctave.floquet.propagate import closed, march, multipliers_and_shifts, response
-from suboctave.floquet.resolution import ACCURACY, longest_rest, parts_needed, states_needed
+from suboctave.floquet.resolution import ACCURACY, divided, longest_rest, states_needed
 from suboctave.floquet.result import FloquetResult
 from suboctave.floquet.time_mesh import (
     NODES,
@@ -58,7 +58,6 @@ from suboctave.floquet.time_mesh import (
     events_along,
     longest_panel,
     panels_between,
-    split,
 )
 from suboctave.harmonic.aft.channel import Channel
 from suboctave.harmonic.aft.closed_form import NO_ROWS
@@ -77,8 +76,8 @@ _NEGLECTED = (1e-4, 1e-2)
 _LENGTHS = (1.2, 1.8, TURNS, 1.0 / 12.0)
 #: logarithm of what is left of states that count no more: they need not be followed
 _FORGOTTEN = math.log(1e-14)
-#: most panels that a period is cut into for that
-_MOST = 20000
+#: how often panels are made shorter, as what is seen between their nodes needs it
+_DIVIDED = 6
 #: nodes per period of a law of unknown smoothness, in units of panels of one radian; phase of a tangent over a panel
 _BLIND, _TANGENT = 48.0, 7.0
 #: width of the slices that are cut out around corners, in units of the motion
@@ -127,6 +126,7 @@ class _Linearised:
             self.active = np.concatenate((np.arange(own.first), own.numbers))[blocks.active]
         degree = max(own.degree, laws.degree)
         longest = min(longest_panel(self._motions, degree), own.finest)
+        self._kinked = laws.unknown_samples > 0 or own.unknown
         if laws.unknown_samples:
             longest = min(longest, _BLIND / laws.unknown_samples)
         grid = search_grid(state.basis.harmonics)
@@ -142,10 +142,13 @@ class _Linearised:
         events = events_along(self._motions, laws.pieces, laws.owner, passages, grid.zr, grid.zi)
         self.events = events[np.argsort(events[:, 0], kind="stable")]
         panels, start = panels_between(self.events, longest)
-        parts, total = self._evaluated(panels)
-        while len(panels) < total <= _MOST:
-            panels, start = split(panels, start, parts)
-            parts, total = self._evaluated(panels)
+        self._evaluated(panels)
+        for _ in range(_DIVIDED):
+            finer, begins = self._divided(panels, start)
+            if len(finer) == len(panels):
+                break
+            panels, start = finer, begins
+            self._evaluated(panels)
         rest = 0.0
         if blocks.steepest[self._dynamic] * 2.0 * math.pi < _FORGOTTEN * state.rate:
             first, rest = longest_rest(self.spans, self.law, self.base, self.active, start)
@@ -172,8 +175,8 @@ class _Linearised:
         self.before, self._start = np.empty((size, size)), np.empty((size, 1))
         closed(self._whole, self._kept, self.before, self._start)
 
-    def _evaluated(self, panels: Array) -> tuple[np.ndarray, float]:
-        """Evaluate all laws on panels; how many parts each of these needs, (P,), and how many panels that makes."""
+    def _evaluated(self, panels: Array) -> None:
+        """Evaluate all laws on panels, and which blocks have states."""
         laws, count, channels = self._laws, len(panels), len(self._motions)
         nodes = count * (ORDER - 1) + 1
         self.spans, self.path = np.empty((count, ORDER)), np.empty((channels, 2, nodes))
@@ -189,13 +192,18 @@ class _Linearised:
             blocks.decays, blocks.flexibility, blocks.share[0], blocks.first, blocks.coupled, resolved, _NEGLECTED,
         )  # fmt: skip
         self._form()
-        parts: np.ndarray
-        total: float
-        parts, total = parts_needed(
-            self.spans, self.law, self.loose, self.active, blocks.rates, blocks.flexibility,
-            blocks.share[1, blocks.first[self._dynamic]], self._dynamic, self.neglected, _LENGTHS,
+
+    def _divided(self, panels: Array, start: np.ndarray) -> tuple[Array, np.ndarray]:
+        """Panels as short as the structure needs, and which of them events begin with."""
+        blocks = self._blocks
+        finer: Array
+        begins: np.ndarray
+        finer, begins = divided(
+            panels, start, self.spans, self.law, self.loose, self.active, blocks.rates, blocks.decays,
+            blocks.flexibility, blocks.share[1, blocks.first[self._dynamic]], self._dynamic, self.neglected,
+            self._kinked, _LENGTHS,
         )  # fmt: skip
-        return parts, total
+        return finer, begins
 
     def _form(self) -> None:
         """The forms of the structure along the panels, and what of the stiffness of the pieces is not within them."""
@@ -293,6 +301,8 @@ class Channels:
         What panels follow along these channels.
     degree, finest
         Degree of the tangents as polynomials in the motion; longest panel that they allow.
+    unknown
+        Whether a law may be anything.
     """
 
     def __init__(self, state: BalanceState) -> None:
@@ -301,7 +311,7 @@ class Channels:
         self.forces: list[ComplexArray] = []
         self.numbers: list[int] = []
         self.probes: list[Probe] = []
-        self.degree, self.finest = 0, math.inf
+        self.degree, self.finest, self.unknown = 0, math.inf, False
         #: every law, the channel of its first input, and what its forces along every input are multiplied by
         self._laws: list[tuple[GeneralLaw, int, Array]] = []
         self._tangents: list[Array] = []
@@ -350,6 +360,7 @@ class Channels:
             self._channel(velocity, Probe(NO_ROWS, *law.sharp_velocities))
         degree = max(1, law.degree - 1)
         self.degree = max(self.degree, degree)
+        self.unknown = self.unknown or law.unknown
         if law.cornered or law.unknown:
             self.finest = min(self.finest, _BLIND / nodal.samples)
         if nodal.harmonic:

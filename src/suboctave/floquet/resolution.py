@@ -16,6 +16,10 @@ from suboctave.floquet.time_mesh import WEIGHTS
 _TINY = float(np.finfo(float).tiny)
 #: what panels are made for: errors of multipliers, and share of what blocks without states may move them
 ACCURACY, _FINER = 1e-8, 0.01
+#: most panels that a period is cut into
+MOST = 20000
+#: logarithm of the share of a block in a force below which it counts no more
+_UNSEEN = math.log(1e-9)
 #: impulses in a period that blocks without states may miss
 _CHANGES = 4.0
 
@@ -129,22 +133,61 @@ def states_needed(
 
 
 @kernel()
-def parts_needed(spans, law, loose, active, rates, flexibility, stiffening, dynamic, neglected, limits):
-    """Into how many parts panels with dt/ds = spans (P, m) have to be cut, (P,), and how many there are then, a float.
-
-    law, loose, active: see `march`; rates, flexibility: see `blocks.Blocks`; stiffening (G,): how much an impulse of
-    stiffness in a channel adds to squared rates; dynamic, neglected: see `with_states`. limits: lengths of parts in
-    units of the fastest time scale of the forces, of that of the blocks as channels see them, and of that of the blocks
-    where panels are not uniform; the power of the share of a block in a force with which it counts for the second.
+def _sight(seen, speed, decays, since, power):
+    """How fast what blocks add to a force turns, rad per unit time, at a time `since` the last of what sets them off;
+    seen, speed (B,): logarithms of the share of each in the force at its beginning, and of its rate.
     """
-    panels, m = spans.shape
+    fastest = -np.inf
+    for b in range(seen.shape[0]):
+        left = min(0.0, seen[b]) + min(0.0, decays[b]) * since
+        if left > _UNSEEN:
+            fastest = max(fastest, speed[b] + power * left)
+    return math.exp(fastest)
+
+
+@kernel()
+def divided(
+    panels, start, spans, law, loose, active, rates, decays, flexibility, stiffening, dynamic, neglected, kinked, limits
+):  # fmt: skip
+    """Panels (., 4) as short as forces need them, and which of them events begin with; those given if that would be
+    more than `MOST`.
+
+    Blocks are set off by events, and by what a period begins with, and decay from then on: panels become longer.
+
+    Parameters
+    ----------
+    panels, start, spans
+        See `time_mesh.panels_between` and `along_panels`.
+    law, loose, active
+        See `march`.
+    rates, decays, flexibility
+        See `blocks.Blocks`.
+    stiffening
+        How much an impulse of stiffness in a channel adds to squared rates, (G,).
+    dynamic, neglected
+        See `with_states`.
+    kinked
+        Whether forces may set blocks off anywhere.
+    limits
+        Lengths of panels in units of the fastest time scale of the forces, of that of the blocks as channels see them,
+        and of that of the blocks where panels are not uniform; the power of the share of a block in a force with which
+        it counts for the second.
+    """
+    count, m = spans.shape
     # panels need not be much better than what is neglected
     seeing = limits[1] * max(1.0, _FINER * neglected / ACCURACY) ** 0.1
     fastest = rates[dynamic - 1] if dynamic > 0 else 0.0
-    parts, total = np.ones(panels, dtype=np.int64), 0.0
+    out, where, added, since = np.empty((2 * count, 4)), np.empty(count, dtype=np.int64), 0, 0.0
+    seen, speed = np.empty(dynamic), np.empty(dynamic)
+    for b in range(dynamic):
+        speed[b] = math.log(max(rates[b], _TINY))
     k, c = np.empty(active.shape[0]), np.empty(active.shape[0])
-    for p in range(panels):
-        a = rate = sight = length = 0.0
+    sets_off = np.zeros(count, dtype=np.bool_)
+    for i in range(start.shape[0]):
+        sets_off[start[i]] = True
+    for p in range(count):
+        where[p] = added
+        a = rate = length = 0.0
         for j in range(m):
             length += WEIGHTS[j] * spans[p, j]
         for g in range(active.shape[0]):
@@ -154,16 +197,36 @@ def parts_needed(spans, law, loose, active, rates, flexibility, stiffening, dyna
                 c[g] = max(c[g], abs(law[active[g], 2, j]))
             a += stiffening[g] * k[g]
             rate += stiffening[g] * c[g]
-        for b in range(dynamic if a > 0.0 or rate > 0.0 else 0):
-            seen = 0.0
-            for g in range(active.shape[0]):
-                seen += (k[g] + c[g] * rates[b]) * abs(flexibility[b, g, g])
-            if seen > 0.0:
-                sight = max(sight, rates[b] * min(1.0, seen) ** limits[3])
+        for b in range(dynamic):
+            share = 0.0
+            for g in range(active.shape[0] if a > 0.0 or rate > 0.0 else 0):
+                share += (k[g] + c[g] * rates[b]) * abs(flexibility[b, g, g])
+            seen[b] = math.log(share) if share > 0.0 else -np.inf
         uniform = abs(spans[p, 0] - spans[p, m // 2]) <= 1e-12 * spans[p, 0]
+        needed = (math.sqrt(a) + rate) / limits[0]
         turning = 0.0 if uniform else fastest / limits[2]
-        wanted = math.ceil(length * max((math.sqrt(a) + rate) / limits[0] + sight / seeing, turning))
-        total += max(wanted, 1.0)
-        # no more than a number of parts: beyond a million nothing is cut
-        parts[p] = int(min(wanted, 1e6)) if wanted >= 1.0 else 1
-    return parts, total
+        since = 0.0 if sets_off[p] or kinked else since
+        # equal parts as its end needs them, and these in halves
+        last = 0.0 if kinked else since + length
+        wanted = length * max(needed + _sight(seen, speed, decays, last, limits[3]) / seeing, turning)
+        if not wanted < MOST:
+            return panels, start
+        parts = max(1, math.ceil(wanted))
+        at, whole = 0.0, 1.0 / parts
+        while at < 1.0 - 1e-9:
+            size, now = whole, since if kinked else since + at * length
+            sight = needed + _sight(seen, speed, decays, now, limits[3]) / seeing
+            # halves begin at multiples of themselves
+            while size * length * sight > 1.0 or abs(at / size - round(at / size)) > 1e-6:
+                size *= 0.5
+            if added >= MOST:
+                return panels, start
+            if added == out.shape[0]:
+                out = np.concatenate((out, np.empty_like(out)))
+            out[added] = panels[p]
+            out[added, 0] = panels[p, 0] + at * (panels[p, 1] - panels[p, 0])
+            at = min(1.0, at + size) if at + size < 1.0 - 1e-9 else 1.0
+            out[added, 1] = panels[p, 0] + at * (panels[p, 1] - panels[p, 0])
+            added += 1
+        since += length
+    return out[:added].copy(), where[start]

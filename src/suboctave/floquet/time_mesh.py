@@ -4,7 +4,7 @@ A period is cut into panels on which everything is smooth: at the instants where
 piecewise-linear law (there the stiffness jumps), and towards the passages of a sharp law. A law with singularities at
 `u = point +- i width` has, along the motion, singularities at complex instants `s +- i d`; near them panels are equal
 in v, with `tau = s + d sinh(v)`, in which they lie at `+- i pi / 2` whatever the sharpness is. Elsewhere panels are
-equal in tau and as long as the motion's harmonics allow; `split` makes them as short as the structure needs.
+equal in tau and as long as the motion's harmonics allow; `resolution` makes them as short as the structure needs.
 """
 
 from __future__ import annotations
@@ -174,17 +174,6 @@ def panels_between(events, longest):
             # an event without a panel of its own at the period's end
             start[i] -= count
     return out[:count].copy(), start
-
-
-def split(panels: Array, start: np.ndarray, parts: np.ndarray) -> tuple[Array, np.ndarray]:
-    """Panels of which each is cut into `parts` (P,) equal ones, and where each event's begin."""
-    ends = np.cumsum(parts)
-    rows = np.repeat(panels, parts, axis=0)
-    number = np.arange(len(rows)) - np.repeat(ends - parts, parts)
-    length = (rows[:, 1] - rows[:, 0]) / np.repeat(parts, parts)
-    rows[:, 0] += length * number
-    rows[:, 1] = rows[:, 0] + length
-    return rows, (ends - parts)[start]
 
 
 @kernel()
