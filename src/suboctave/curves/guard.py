@@ -23,6 +23,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from suboctave.compiled import kernel
 from suboctave.continuation.linear import length
 from suboctave.continuation.point import CurvePoint, between
 from suboctave.continuation.problem import Array
@@ -32,7 +33,6 @@ from suboctave.curves.sample import Sample
 from suboctave.curves.trace import Audit
 from suboctave.errors import ConvergenceError
 from suboctave.floquet.held import of_those_moved
-from suboctave.harmonic.basis import ComplexArray
 
 #: multipliers of modulus above one half may move by this much per interval (relative to their modulus above one)
 MOVEMENT = 0.5
@@ -279,12 +279,15 @@ def _mixed(p: Sample, q: Sample) -> bool:
     return p.measures[0, -1] != q.measures[0, -1] and any(kind is not NEIMARK_SACKER for kind in changes(p, q))
 
 
-def _movement(old: ComplexArray, new: ComplexArray) -> float:
+@kernel()
+def _movement(old, new):
     """Largest distance from a new multiplier of modulus above one half to the nearest old one."""
-    # there are few that count: numbers are quicker than arrays
-    before, largest = old.tolist(), 0.0
-    for mu in new.tolist():
+    largest = 0.0
+    for mu in new:
         size = abs(mu)
         if size > 0.5:
-            largest = max(largest, min(abs(mu - other) for other in before) / max(1.0, size))
+            nearest = np.inf
+            for other in old:
+                nearest = min(nearest, abs(mu - other))
+            largest = max(largest, nearest / max(1.0, size))
     return largest

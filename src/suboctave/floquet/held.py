@@ -16,6 +16,7 @@ the vibrations with which it is not small.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
@@ -23,7 +24,8 @@ from typing import NamedTuple
 import numpy as np
 
 from suboctave.compiled import kernel
-from suboctave.floquet.symmetric import symmetric_functions
+from suboctave.floquet.symmetric import multiply
+from suboctave.harmonic.aft.channel import Group
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.linear_part import LinearPart
@@ -42,9 +44,18 @@ class Grip(NamedTuple):
     strengths: Array
 
 
-@lru_cache(maxsize=64)
-def _vibrations(linear: LinearPart) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-    """Exponents (2 N,), what a force changes in each, (2 N, N), and the displacements of each, (N, 2 N)."""
+class _Exchange(NamedTuple):
+    """Vibrations and the channels that couple them: exponents (2 N,), and of every input of a channel how much a force
+    there pushes each, and how much of each is read there, (C, 2 N).
+    """
+
+    exponents: ComplexArray
+    pushed: Array
+    read: Array
+
+
+@lru_cache(maxsize=16)
+def _exchange(linear: LinearPart, groups: tuple[Group, ...]) -> _Exchange:
     mass, damping, stiffness = linear.equation_of_motion()
     n = len(mass)
     inverse = np.linalg.inv(mass)
@@ -52,39 +63,52 @@ def _vibrations(linear: LinearPart) -> tuple[ComplexArray, ComplexArray, Complex
     exponents, right = np.linalg.eig(flow)
     order = np.lexsort((exponents.imag, exponents.real, np.abs(exponents)))
     right = right[:, order].astype(complex)
-    left = np.linalg.pinv(right)
-    return exponents[order].astype(complex), left[:, n:] @ inverse, right[:n]
+    left = np.linalg.pinv(right)[:, n:] @ inverse
+    pairs = [(linear.expand(group.direction), linear.expand(d)) for group in groups for d in group.inputs]
+    pushed = np.array([np.abs(left @ out) for out, _ in pairs]).reshape(-1, 2 * n)
+    read = np.array([np.abs(d @ right[:n]) for _, d in pairs]).reshape(-1, 2 * n)
+    return _Exchange(exponents[order].astype(complex), pushed, read)
 
 
 def grip(state: BalanceState, multipliers: ComplexArray) -> Grip:
     """What elements may do to the vibrations of a structure along a motion with these multipliers."""
-    exponents, left, right = _vibrations(state.linear)
-    count, turns = len(exponents), np.abs(exponents.imag) / state.rate
-    apart = np.abs(turns[:, None] - turns)
-    # a vibration with itself resonates at twice its frequency
-    apart[np.arange(count), np.arange(count)] = 2.0 * turns
-    lowest = np.maximum(apart.astype(int) - 1, 0)
-    coupling = np.zeros((count, count))
+    exchange = _exchange(state.linear, state.balance.all_groups)
+    count, channels = len(exchange.exponents), len(exchange.pushed)
+    stiffness, damping, at = np.zeros((channels, state.balance.top + 1)), np.zeros(channels), 0
     for channel in state.channels:
-        pushed = np.abs(left @ state.linear.expand(channel.out))
-        for i, d in enumerate(channel.ins):
-            rate = _envelope(channel.stiffness(i))[np.minimum(lowest, state.balance.top)]
+        for i in range(channel.count):
+            # the largest among the Fourier coefficients from each one on
+            stiffness[at] = np.maximum.accumulate(np.abs(channel.stiffness(i))[::-1])[::-1]
             if channel.moving:  # its mean takes or gives energy by itself
-                rate = rate + np.abs(channel.damping(i)).max() * np.abs(exponents)
-            coupling += rate * np.multiply.outer(pushed, np.abs(state.linear.expand(d) @ right))
-    loss = -exponents.real
-    with np.errstate(divide="ignore", invalid="ignore"):
-        strengths = coupling * coupling.T / np.multiply.outer(loss, loss)
-    strengths[~(loss > 0.0)] = strengths[:, ~(loss > 0.0)] = np.inf
+                damping[at] = np.abs(channel.damping(i)).max()
+            at += 1
+    strengths = np.empty((count, count))
+    _strengths(exchange.exponents, exchange.pushed, exchange.read, stiffness, damping, state.rate, strengths)
     if len(multipliers) != count:
         return Grip(np.full(count, -1), strengths)
-    return Grip(_places(multipliers, np.exp(exponents * (2.0 * np.pi / state.rate))), strengths)
+    return Grip(_places(multipliers, np.exp(exchange.exponents * (2.0 * np.pi / state.rate))), strengths)
 
 
-def _envelope(spectrum: ComplexArray) -> Array:
-    """The largest modulus among the Fourier coefficients from each one on."""
-    largest: Array = np.maximum.accumulate(np.abs(spectrum)[::-1])[::-1]
-    return largest
+@kernel(error_model="numpy")
+def _strengths(exponents, pushed, read, stiffness, damping, rate, out):
+    """g_ij into `out` (2 N, 2 N); stiffness (C, top + 1): the largest of the Fourier coefficients from each one on,
+    damping (C,): that of all; others: see `_Exchange`.
+    """
+    count, top = exponents.shape[0], stiffness.shape[1] - 1
+    coupling = np.zeros((count, count))
+    for i in range(count):
+        for j in range(count):
+            turns = abs(exponents[i].imag) / rate
+            # a vibration with itself resonates at twice its frequency
+            apart = abs(turns - abs(exponents[j].imag) / rate) if i != j else 2.0 * turns
+            lowest = int(min(max(math.floor(apart) - 1.0, 0.0), top))
+            for c in range(pushed.shape[0]):
+                held = stiffness[c, lowest] + damping[c] * abs(exponents[j])
+                coupling[i, j] += held * pushed[c, i] * read[c, j]
+    for i in range(count):
+        for j in range(count):
+            a, b = -exponents[i].real, -exponents[j].real
+            out[i, j] = coupling[i, j] * coupling[j, i] / (a * b) if a > 0.0 and b > 0.0 else np.inf
 
 
 def of_those_moved(motions: Sequence[tuple[ComplexArray, Grip]]) -> list[Array]:
@@ -93,22 +117,50 @@ def of_those_moved(motions: Sequence[tuple[ComplexArray, Grip]]) -> list[Array]:
     """
     if len({len(mu) for mu, _ in motions}) > 1:
         return []
-    coupled = np.max([known.strengths for _, known in motions], axis=0) >= _SMALL
-    told = np.all([known.places >= 0 for _, known in motions], axis=0) & ~coupled.diagonal()
-    told[(coupled & told & told[:, None]).any(axis=0)] = False
-    beside = told & coupled[~told].any(axis=0)
-    functions = []
-    for mu, known in motions:
-        moved, others = np.delete(mu, known.places[told]), mu[known.places[beside]]
-        own = symmetric_functions(moved)
-        pairs = np.multiply.outer(others, moved).ravel()
-        # they come in conjugate pairs, but where both are real
-        negative = (np.abs(pairs.imag) <= 1e-12 * np.abs(pairs)) & (pairs.real > 1.0)
-        own[0, 2] *= (-1.0) ** np.count_nonzero(negative)
-        with np.errstate(divide="ignore"):
-            own[1, 2] += float(np.sum(np.log(np.abs(1.0 - pairs)) - 0.5 * np.log1p(np.abs(pairs) ** 2)))
-        functions.append(own)
-    return functions
+    multipliers, places = np.array([mu for mu, _ in motions]), np.array([known.places for _, known in motions])
+    coupled = np.zeros(motions[0][1].strengths.shape, dtype=bool)
+    for _, known in motions:
+        coupled |= known.strengths >= _SMALL
+    functions = np.empty((len(motions), 2, 3))
+    _moved(multipliers, places, coupled, functions)
+    return list(functions)
+
+
+@kernel()
+def _moved(multipliers, places, coupled, functions):
+    """`of_those_moved` into `functions` (Q, 2, 3); multipliers (Q, m), places (Q, m), coupled (m, m): which pairs may
+    become unstable.
+    """
+    motions, count = places.shape
+    alone = np.ones(count, dtype=np.bool_)
+    for i in range(count):
+        alone[i] = not coupled[i, i]
+        for q in range(motions):
+            alone[i] = alone[i] and places[q, i] >= 0
+    told, beside = alone.copy(), np.zeros(count, dtype=np.bool_)
+    for i in range(count):
+        for j in range(count):
+            if alone[i] and alone[j] and coupled[j, i]:
+                told[i] = False
+    for i in range(count):
+        for j in range(count):
+            beside[i] = beside[i] or (told[i] and not told[j] and coupled[j, i])
+    for q in range(motions):
+        mu, own = multipliers[q], functions[q]
+        left_out = np.zeros(mu.shape[0], dtype=np.bool_)
+        for i in range(count):
+            if told[i]:
+                left_out[places[q, i]] = True
+        moved = mu[~left_out]
+        multiply(moved, own)
+        for i in range(count):
+            for j in range(moved.shape[0] if beside[i] else 0):
+                of = mu[places[q, i]] * moved[j]
+                size = abs(of)
+                # they come in conjugate pairs, but where both are real
+                if abs(of.imag) <= 1e-12 * size and of.real > 1.0:
+                    own[0, 2] = -own[0, 2]
+                own[1, 2] += np.log(abs(1.0 - of)) - 0.5 * np.log1p(size * size)
 
 
 @kernel()

@@ -19,6 +19,8 @@ from suboctave.harmonic.basis import Array, ComplexArray
 
 #: sum of the logarithms of all multipliers, `-int trace(M^-1 (C + f_v)) dt`, below which a motion counts as undamped
 UNDAMPED = 1e-9
+#: squares of products beyond which a factor is one to rounding
+_LARGE = 1e280
 
 
 def symmetric_functions(mu: ComplexArray) -> Array:
@@ -29,23 +31,28 @@ def symmetric_functions(mu: ComplexArray) -> Array:
     conjugate pairs: the sign is that of the real ones.
     """
     out = np.empty((2, 3))
-    _multiply(mu, out)
+    multiply(mu, out)
     return out
 
 
 @kernel()
-def _multiply(mu, out):
+def multiply(mu, out):
     """`symmetric_functions` into (2, 3)."""
     m, total = mu.shape[0], 0.0
     for i in range(m):
         total += np.log(np.abs(mu[i]))
     for k in range(3):
-        sign, logarithm = 1.0, 0.0
+        sign, logarithm, product = 1.0, 0.0, 1.0
         for i in range(m if k < 2 or abs(total) >= UNDAMPED else 0):
             for j in range(i if k == 2 else 1):
                 of = mu[i] * mu[j] if k == 2 else mu[i]
-                factor, size = (1.0 + of if k == 1 else 1.0 - of), np.abs(of)
-                if abs(of.imag) <= 1e-12 * size and factor.real < 0.0:
+                real, size = (1.0 + of.real if k == 1 else 1.0 - of.real), of.real**2 + of.imag**2
+                if real < 0.0 and of.imag**2 <= 1e-24 * size:
                     sign = -sign
-                logarithm += np.log(np.abs(factor)) - 0.5 * np.log1p(size * size)
-        out[0, k], out[1, k] = sign, logarithm
+                if size < _LARGE:
+                    product *= (real * real + of.imag**2) / (1.0 + size)
+                if not 1.0 / _LARGE < product < _LARGE:
+                    # one logarithm for many factors
+                    logarithm += np.log(product)
+                    product = 1.0
+        out[0, k], out[1, k] = sign, 0.5 * (logarithm + np.log(product))
