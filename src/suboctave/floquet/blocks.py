@@ -348,15 +348,13 @@ class Forms(NamedTuple):
 @lru_cache(maxsize=32)
 def forms_along(
     linear: LinearPart, groups: tuple[Group, ...], dynamic: int, sequence: tuple[tuple[float, ...], ...]
-) -> tuple[Forms, np.ndarray, float]:
-    """The forms of a sequence of stiffnesses (G,); where these are within the forms (R,), which are those of the free
-    structure elsewhere; and the largest of their relative errors by rounding.
+) -> tuple[Forms, float]:
+    """The forms of a sequence of stiffnesses (G,), and the largest of their relative errors by rounding; where there is
+    none for a stiffness, that of the free structure.
     """
-    found = [form_of(linear, groups, dynamic, held) for held in sequence]
     free = form_of(linear, groups, dynamic, (0.0,) * len(in_blocks(linear, groups).active))
     assert free is not None
-    within = np.array([form is not None for form in found])
-    chosen = [form or free for form in found]
+    chosen = [form_of(linear, groups, dynamic, held) or free for held in sequence]
     most, size = max(len(form.motion) for form in chosen), len(free.driven)
     motion, first = np.zeros((len(chosen), most, 2, 2)), np.full((len(chosen), most + 1), size)
     coupling = np.zeros((len(chosen), len(free.coupling), 2 * most))
@@ -366,10 +364,12 @@ def forms_along(
         coupling[r, :, : 2 * blocks] = form.coupling
     steps = list(pairwise([free, *chosen, free]))
     turning = np.array([old is not new for old, new in steps])
-    turns = np.zeros((len(turning) if turning.any() else 0, size, size))
+    turns = np.empty((len(turning) if turning.any() else 0, size, size))
     for r in turning.nonzero()[0].tolist():
         old, new = steps[r]
-        turns[r] = old.out if new is free else new.back if old is free else new.back @ old.out
+        if new is free or old is free:
+            turns[r] = old.out if new is free else new.back
+        else:
+            np.dot(new.back, old.out, out=turns[r])
     driven, read, flexible = (np.stack([getattr(f, name) for f in chosen]) for name in ("driven", "read", "flexible"))
-    rounding = max(form.rounding for form in chosen)
-    return Forms(motion, first, driven, read, coupling, flexible, turns, turning), within, rounding
+    return Forms(motion, first, driven, read, coupling, flexible, turns, turning), max(f.rounding for f in chosen)

@@ -45,7 +45,7 @@ import numpy as np
 import scipy.linalg
 from scipy.linalg import lapack
 
-from suboctave.floquet.blocks import forms_along, in_blocks
+from suboctave.floquet.blocks import form_of, forms_along, in_blocks
 from suboctave.floquet.exponentials import TURNS, structure
 from suboctave.floquet.propagate import closed, march, multipliers_and_shifts, response
 from suboctave.floquet.resolution import ACCURACY, divided, longest_rest, states_needed
@@ -117,7 +117,8 @@ class _Linearised:
         balance = state.balance
         self.state = state
         own = self._own = Channels(state)
-        self._blocks = blocks = in_blocks(state.linear, balance.all_groups)
+        self._structure = state.linear, balance.all_groups
+        self._blocks = blocks = in_blocks(*self._structure)
         self._laws = laws = PackedLaws(state.laws.groups, own.probes) if own.probes else state.packed
         self._motions, self._forces, self.active = state.motions, state.force_spectra, blocks.active
         if own.probes:
@@ -168,6 +169,7 @@ class _Linearised:
             lasting = blocks.decays[:dynamic] * rest >= _FORGOTTEN
             self._kept = np.flatnonzero(np.repeat(lasting, np.diff(blocks.first[: dynamic + 1])))
         self.size = size = len(self._kept)
+        self._forms, self._turned = forms_along(*self._structure, dynamic, self._sequence)
         self._structures = structure(self.spans, self._stretch, self._forms)
         self._acting = np.empty((len(self.spans), channels), dtype=bool)
         self._solved = np.empty((len(self.spans), channels * ORDER, size + 1))
@@ -191,7 +193,7 @@ class _Linearised:
             self.spans, self._forces, self.law, self.base, self.active, self._most, self._held, blocks.rates,
             blocks.decays, blocks.flexibility, blocks.share[0], blocks.first, blocks.coupled, resolved, _NEGLECTED,
         )  # fmt: skip
-        self._form()
+        self._contacts()
 
     def _divided(self, panels: Array, start: np.ndarray) -> tuple[Array, np.ndarray]:
         """Panels as short as the structure needs, and which of them events begin with."""
@@ -205,18 +207,21 @@ class _Linearised:
         )  # fmt: skip
         return finer, begins
 
-    def _form(self) -> None:
-        """The forms of the structure along the panels, and what of the stiffness of the pieces is not within them."""
+    def _contacts(self) -> None:
+        """The stiffnesses of pieces along the panels one after the other, those of their panels, and what of them no
+        form of the structure has.
+        """
         held, self._stretch = self.base[self.active], np.zeros(len(self.spans), dtype=np.int64)
         begins = np.zeros(1, dtype=np.int64)
+        self.loose = np.zeros_like(self.base)
         if held.any():
             changes = (held[:, 1:] != held[:, :-1]).any(axis=0)
-            self._stretch[1:] = changes.cumsum()
+            changes.cumsum(out=self._stretch[1:])
             begins = np.append(0, changes.nonzero()[0] + 1)
-        sequence = tuple(map(tuple, held[:, begins].T.tolist()))
-        groups = self.state.balance.all_groups
-        self._forms, within, self._turned = forms_along(self.state.linear, groups, self._dynamic, sequence)
-        self.loose = self.base * ~within[self._stretch] if not within.all() else np.zeros_like(self.base)
+        self._sequence = tuple(map(tuple, held[:, begins].T.tolist()))
+        for r, stiffness in enumerate(self._sequence):
+            if form_of(*self._structure, self._dynamic, stiffness) is None:
+                self.loose[:, self._stretch == r] = self.base[:, self._stretch == r]
 
     def _march(self, law: Array, kick: Array, columns: int) -> Array:
         """States at the end of the period, (S, columns); see `propagate.march`."""
