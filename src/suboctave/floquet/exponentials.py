@@ -1,10 +1,12 @@
 """What blocks of the linear part make of initial states and of forces on a panel, exactly.
 
 See `propagate` for the formulas: exponentials of blocks in closed form, and their integrals with Lagrange's polynomials
-by Gauss's formula between neighbouring nodes, which holds on panels of any mapping. Where a block turns many times
-over a panel that is uniform in time, they are integrated by parts,
+by Gauss's formula between neighbouring nodes, which holds on panels of any mapping. On those that are uniform in time
+they follow from the phi functions of exponential integrators (Hochbruck & Ostermann, Acta Numerica 19 (2010) 209-286),
 
-    int_0^t exp(L (t - s)) P(s) ds = sum_k L^-(k+1) (exp(L t) P^(k)(0) - P^(k)(t)).
+    int_0^t exp(L (t - s)) s^k ds = k! t^(k+1) phi_(k+1)(L t),    phi_k(z) = 1/k! + z phi_(k+1)(z),    phi_0 = exp,
+
+however fast a block is.
 """
 
 from __future__ import annotations
@@ -20,8 +22,10 @@ from suboctave.floquet.time_mesh import NODES, ORDER
 _FAST = {"reassoc", "contract", "nsz"}
 #: points of Gauss's formula between neighbouring nodes
 _POINTS = 8
-#: phase of a block over a panel from which on integrals by parts lose no digits; that to which Gauss's formula serves
+#: phase of a block over a panel to which that serves
 TURNS = 24.0
+#: moduli from which phi functions follow from those before, and terms of the series of the last of them below
+_UPWARDS, _TERMS = 3.0, 20
 
 
 def _between() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -39,14 +43,18 @@ def _between() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     return np.ascontiguousarray(values), np.ascontiguousarray(until), over[1:] - over[:-1], 0.5 * (right - left) * w
 
 
-def _derivatives() -> np.ndarray:
-    """All derivatives at the nodes from values there, (m, m, m)."""
-    lagrange = [np.polynomial.Polynomial(row) for row in np.linalg.inv(np.vander(NODES, increasing=True)).T]
-    return np.array([[p.deriv(k)(NODES) for p in lagrange] for k in range(ORDER)]).transpose(0, 2, 1).copy()
+def _powers() -> np.ndarray:
+    """What Lagrange's polynomials are made of up to every node, in units of `t phi_(k+1)`, (m, k, m)."""
+    lagrange = np.linalg.inv(np.vander(0.5 * (NODES + 1.0), increasing=True))
+    k = np.arange(ORDER)
+    factorials = np.array([math.factorial(i) for i in k], dtype=float)
+    scale = factorials * np.power.outer(0.5 * (NODES + 1.0), k)
+    return np.ascontiguousarray(scale[:, :, None] * lagrange)
 
 
 _VALUES, _UNTIL, _WHOLE, _WEIGHTS = _between()
-_DERIVATIVES = _derivatives()
+_POWERS = _powers()
+_FACTORIALS = np.array([1.0 / math.factorial(i) for i in range(ORDER + _TERMS + 1)])
 
 
 @kernel(fastmath=_FAST, error_model="numpy")
@@ -64,49 +72,50 @@ def exponential(mean, square, t):
 
 
 @kernel(fastmath=_FAST, error_model="numpy")
-def _by_parts(length, mean, square, e, w):
-    """w_0, w_1 at the nodes of a uniform panel, see `_integrals`, from e_0, e_1 there."""
+def _uniform(length, mean, square, e, w):
+    """`_integrals` on a panel of this length that is uniform in time."""
     m = ORDER
-    for l in range(m * m):
-        w[0, l] = w[1, l] = 0.0
-    trace, minus, scale = 2.0 * mean, square - mean * mean, 2.0 / length
-    # L^-1 = (L - trace) / minus, a power more each time
-    x, y = -trace / minus, 1.0 / minus
-    p, q = x, y
-    for k in range(m):
-        for j in range(1, m):
-            u, v = p * e[0, j] + minus * q * e[1, j], p * e[1, j] + q * e[0, j] + trace * q * e[1, j]
-            for l in range(m):
-                first, here = _DERIVATIVES[k, 0, l], _DERIVATIVES[k, j, l]
-                w[0, j * m + l] += u * first - p * here
-                w[1, j * m + l] += v * first - q * here
-        p, q = scale * (p * x + minus * q * y), scale * (p * y + q * x + trace * q * y)
+    phi = np.empty((2, m + 1))
+    for j in range(1, m):
+        t = 0.5 * (NODES[j] + 1.0) * length
+        e[0, j], e[1, j] = exponential(mean, square, t)
+        # in z = L t, with z^2 = trace z + minus
+        trace, minus = 2.0 * mean * t, (square - mean * mean) * t * t
+        if abs(minus) > _UPWARDS * _UPWARDS:
+            phi[0, 0], phi[1, 0] = e[0, j], e[1, j] / t
+            for k in range(m):
+                x, y = phi[0, k] - _FACTORIALS[k], phi[1, k]
+                phi[0, k + 1], phi[1, k + 1] = y - x * trace / minus, x / minus
+        else:
+            x, y = _FACTORIALS[m + _TERMS], 0.0
+            for n in range(m + _TERMS - 1, 0, -1):
+                x, y = _FACTORIALS[n] + minus * y, x + trace * y
+                if n <= m:
+                    phi[0, n], phi[1, n] = x, y
+        for l in range(m):
+            x = y = 0.0
+            for k in range(m):
+                x += phi[0, k + 1] * _POWERS[j, k, l]
+                y += phi[1, k + 1] * _POWERS[j, k, l]
+            w[0, j * m + l], w[1, j * m + l] = t * x, t * t * y
 
 
 @kernel(fastmath=_FAST, error_model="numpy")
-def _integrals(times, left, rate, uniform, mean, square, e, w):
-    """e_0, e_1 at the nodes into e (2, m), and w_0, w_1 into w (2, m m), on one panel; mean, square: see `exponential`.
+def _integrals(times, left, rate, mean, square, e, w):
+    """e_0, e_1 at the nodes into e (2, m), and w_0, w_1 into w (2, m m), on one panel, but for those at the first node;
+    mean, square: see `exponential`.
 
     times (m - 1,): between the nodes; left, rate (m - 1, points): time from Gauss's points to the next node, and dt/ds
-    there times their weight; uniform: whether time is linear in s.
+    there times their weight.
     """
     m = ORDER
-    e[0, 0], e[1, 0] = 1.0, 0.0
-    trace, minus, length = 2.0 * mean, square - mean * mean, 0.0
+    trace, minus = 2.0 * mean, square - mean * mean
     for i in range(m - 1):
+        old, new = i * m, (i + 1) * m
         x, y = exponential(mean, square, times[i])
         # (x + y L) (u + v L) with L^2 = trace L + minus
         e[0, i + 1] = x * e[0, i] + minus * y * e[1, i]
         e[1, i + 1] = x * e[1, i] + y * e[0, i] + trace * y * e[1, i]
-        length += times[i]
-    if uniform and math.sqrt(abs(minus)) * length > TURNS:
-        _by_parts(length, mean, square, e, w)
-        return
-    for l in range(m):
-        w[0, l] = w[1, l] = 0.0
-    for i in range(m - 1):
-        old, new = i * m, (i + 1) * m
-        x, y = exponential(mean, square, times[i])
         for l in range(m):
             w[0, new + l] = x * w[0, old + l] + minus * y * w[1, old + l]
             w[1, new + l] = x * w[1, old + l] + y * w[0, old + l] + trace * y * w[1, old + l]
@@ -143,8 +152,8 @@ def structure(spans, stretch, forms):
     moved, reading = np.zeros((count, most, 2, 2)), np.empty((count, 2, groups * m, size))
     influence, entering = np.empty((count, 2, groups * m, groups * m)), np.empty((count, size, groups * m))
     times, left, rate = np.empty(m - 1), np.empty((m - 1, _POINTS)), np.empty((m - 1, _POINTS))
-    e, w, sums = np.empty((2, m)), np.empty((2 * most, m * m)), np.zeros((2 * groups * groups, m * m))
-    turned = np.empty(2)
+    e, w, sums = np.zeros((2, m)), np.zeros((2 * most, m * m)), np.zeros((2 * groups * groups, m * m))
+    turned, e[0, 0] = np.empty(2), 1.0
     for p in range(spans.shape[0]):
         d, r = kinds[p], stretch[p]
         if p > 0 and d == kinds[p - 1]:
@@ -169,7 +178,11 @@ def structure(spans, stretch, forms):
             # one number counts as a double one
             mean = 0.5 * (motion[r, b, 0, 0] + motion[r, b, wide - 1, wide - 1])
             half = 0.5 * (motion[r, b, 0, 0] - motion[r, b, wide - 1, wide - 1])
-            _integrals(times, left, rate, uniform, mean, half * half + motion[r, b, 0, 1] * motion[r, b, 1, 0], e, v)
+            square = half * half + motion[r, b, 0, 1] * motion[r, b, 1, 0]
+            if uniform:
+                _uniform(2.0 * spans[p, 0], mean, square, e, v)
+            else:
+                _integrals(times, left, rate, mean, square, e, v)
             for i in range(wide):
                 for k in range(wide):
                     moved[d, b, i, k] = e[1, m - 1] * motion[r, b, i, k] + (e[0, m - 1] if i == k else 0.0)

@@ -16,7 +16,6 @@ the vibrations with which it is not small.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
@@ -89,21 +88,22 @@ def grip(state: BalanceState, multipliers: ComplexArray) -> Grip:
     return Grip(_places(multipliers, np.exp(exchange.exponents * (2.0 * np.pi / state.rate))), strengths)
 
 
-@kernel(error_model="numpy")
+@kernel(fastmath={"reassoc", "contract", "nsz"}, error_model="numpy")
 def _strengths(exponents, pushed, read, stiffness, damping, rate, out):
     """g_ij into `out` (2 N, 2 N); stiffness (C, top + 1): the largest of the Fourier coefficients from each one on,
     damping (C,): that of all; others: see `_Exchange`.
     """
     count, top = exponents.shape[0], stiffness.shape[1] - 1
-    coupling = np.zeros((count, count))
+    coupling, lowest = np.zeros((count, count)), np.empty(count, dtype=np.int64)
+    turns, sizes = np.abs(exponents.imag) / rate, np.abs(exponents)
     for i in range(count):
         for j in range(count):
-            turns = abs(exponents[i].imag) / rate
             # a vibration with itself resonates at twice its frequency
-            apart = abs(turns - abs(exponents[j].imag) / rate) if i != j else 2.0 * turns
-            lowest = int(min(max(math.floor(apart) - 1.0, 0.0), top))
-            for c in range(pushed.shape[0]):
-                held = stiffness[c, lowest] + damping[c] * abs(exponents[j])
+            apart = abs(turns[i] - turns[j]) if i != j else 2.0 * turns[i]
+            lowest[j] = max(int(min(apart, top + 1.0)) - 1, 0)
+        for c in range(pushed.shape[0]):
+            for j in range(count):
+                held = stiffness[c, lowest[j]] + damping[c] * sizes[j]
                 coupling[i, j] += held * pushed[c, i] * read[c, j]
     for i in range(count):
         for j in range(count):
@@ -173,13 +173,13 @@ def _places(mu, linear):
     for i in range(m):
         best = np.inf
         for j in range(m):
-            away = abs(mu[i] - linear[j])
+            away = (mu[i].real - linear[j].real) ** 2 + (mu[i].imag - linear[j].imag) ** 2
             if away < best:
                 best, nearest[i] = away, j
     for j in range(m):
-        best = _SHARE * (1.0 - abs(linear[j]))
+        best = max(_SHARE * (1.0 - abs(linear[j])), 0.0) ** 2
         for i in range(m):
-            away = abs(mu[i] - linear[j])
+            away = (mu[i].real - linear[j].real) ** 2 + (mu[i].imag - linear[j].imag) ** 2
             if away <= best:
                 best, place[j] = away, i
         if place[j] >= 0 and nearest[place[j]] != j:
