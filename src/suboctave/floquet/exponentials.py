@@ -129,6 +129,35 @@ def _integrals(times, left, rate, mean, square, e, w):
 
 
 @kernel(fastmath=_FAST, error_model="numpy")
+def _times(span, times, left, rate):
+    """What `_integrals` wants of a panel with dt/ds = span (m,); returns whether it is uniform in time."""
+    uniform = True
+    for i in range(ORDER - 1):
+        uniform = uniform and abs(span[i + 1] - span[0]) <= 1e-12 * span[0]
+        times[i] = 0.0
+        for l in range(ORDER):
+            times[i] += _WHOLE[i, l] * span[l]
+        for g in range(_POINTS):
+            left[i, g] = rate[i, g] = 0.0
+            for l in range(ORDER):
+                left[i, g] += _UNTIL[i, g, l] * span[l]
+                rate[i, g] += _VALUES[i, g, l] * span[l] * _WEIGHTS[i, g]
+    return uniform
+
+
+@kernel(fastmath=_FAST, error_model="numpy")
+def _kinds(spans, stretch):
+    """A number for every panel, the same for those that follow one another and are the same."""
+    kinds = np.zeros(spans.shape[0], dtype=np.int64)
+    for p in range(1, spans.shape[0]):
+        kinds[p] = kinds[p - 1] + (1 if stretch[p] != stretch[p - 1] else 0)
+        for j in range(spans.shape[1]):
+            if kinds[p] == kinds[p - 1] and abs(spans[p, j] - spans[p - 1, j]) > 1e-12 * spans[p, j]:
+                kinds[p] = kinds[p - 1] + 1
+    return kinds
+
+
+@kernel(fastmath=_FAST, error_model="numpy")
 def structure(spans, stretch, forms):
     """What blocks make of initial states and forces on panels with dt/ds = spans (P, m).
 
@@ -141,12 +170,7 @@ def structure(spans, stretch, forms):
     - entering (D, S, G m): final states from forces at the nodes.
     """
     motion, first, driven, read = forms.motion, forms.first, forms.driven, forms.read
-    kinds = np.zeros(spans.shape[0], dtype=np.int64)
-    for p in range(1, spans.shape[0]):
-        kinds[p] = kinds[p - 1] + (1 if stretch[p] != stretch[p - 1] else 0)
-        for j in range(spans.shape[1]):
-            if kinds[p] == kinds[p - 1] and abs(spans[p, j] - spans[p - 1, j]) > 1e-12 * spans[p, j]:
-                kinds[p] = kinds[p - 1] + 1
+    kinds = _kinds(spans, stretch)
     size, groups = driven.shape[1:]
     m, most, count = ORDER, motion.shape[1], kinds[-1] + 1
     moved, reading = np.zeros((count, most, 2, 2)), np.empty((count, 2, groups * m, size))
@@ -158,17 +182,7 @@ def structure(spans, stretch, forms):
         d, r = kinds[p], stretch[p]
         if p > 0 and d == kinds[p - 1]:
             continue
-        uniform = True
-        for i in range(m - 1):
-            uniform = uniform and abs(spans[p, i + 1] - spans[p, 0]) <= 1e-12 * spans[p, 0]
-            times[i] = 0.0
-            for l in range(m):
-                times[i] += _WHOLE[i, l] * spans[p, l]
-            for g in range(_POINTS):
-                left[i, g] = rate[i, g] = 0.0
-                for l in range(m):
-                    left[i, g] += _UNTIL[i, g, l] * spans[p, l]
-                    rate[i, g] += _VALUES[i, g, l] * spans[p, l] * _WEIGHTS[i, g]
+        uniform = _times(spans[p], times, left, rate)
         for b in range(most):
             s, wide, v = first[r, b], first[r, b + 1] - first[r, b], w[2 * b : 2 * b + 2]
             if wide == 0:

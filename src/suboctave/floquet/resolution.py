@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from suboctave.compiled import kernel
-from suboctave.floquet.time_mesh import WEIGHTS
+from suboctave.floquet.time_mesh import ORDER, WEIGHTS
 
 _TINY = float(np.finfo(float).tiny)
 #: what panels are made for: errors of multipliers, and share of what blocks without states may move them
@@ -146,6 +146,27 @@ def _sight(seen, speed, decays, since, power):
 
 
 @kernel()
+def _forces(law, loose, active, p, rates, flexibility, stiffening, seen):
+    """Rate of the forces on panel p, and the logarithms of the share of every block in them into seen (B,); see
+    `divided`.
+    """
+    a = rate = 0.0
+    seen[:] = 0.0
+    for g in range(active.shape[0]):
+        k = c = 0.0
+        for j in range(p * (ORDER - 1), p * (ORDER - 1) + ORDER):
+            k = max(k, abs(law[active[g], 1, j] + loose[active[g], p]))
+            c = max(c, abs(law[active[g], 2, j]))
+        a += stiffening[g] * k
+        rate += stiffening[g] * c
+        for b in range(seen.shape[0] if k > 0.0 or c > 0.0 else 0):
+            seen[b] += (k + c * rates[b]) * abs(flexibility[b, g, g])
+    for b in range(seen.shape[0]):
+        seen[b] = math.log(seen[b]) if seen[b] > 0.0 else -np.inf
+    return math.sqrt(a) + rate
+
+
+@kernel()
 def divided(
     panels, start, spans, law, loose, active, rates, decays, flexibility, stiffening, dynamic, neglected, kinked, limits
 ):  # fmt: skip
@@ -181,29 +202,15 @@ def divided(
     seen, speed = np.empty(dynamic), np.empty(dynamic)
     for b in range(dynamic):
         speed[b] = math.log(max(rates[b], _TINY))
-    k, c = np.empty(active.shape[0]), np.empty(active.shape[0])
     sets_off = np.zeros(count, dtype=np.bool_)
     for i in range(start.shape[0]):
         sets_off[start[i]] = True
     for p in range(count):
         where[p] = added
-        a = rate = length = 0.0
+        needed, length = _forces(law, loose, active, p, rates, flexibility, stiffening, seen) / limits[0], 0.0
         for j in range(m):
             length += WEIGHTS[j] * spans[p, j]
-        for g in range(active.shape[0]):
-            k[g] = c[g] = 0.0
-            for j in range(p * (m - 1), p * (m - 1) + m):
-                k[g] = max(k[g], abs(law[active[g], 1, j] + loose[active[g], p]))
-                c[g] = max(c[g], abs(law[active[g], 2, j]))
-            a += stiffening[g] * k[g]
-            rate += stiffening[g] * c[g]
-        for b in range(dynamic):
-            share = 0.0
-            for g in range(active.shape[0] if a > 0.0 or rate > 0.0 else 0):
-                share += (k[g] + c[g] * rates[b]) * abs(flexibility[b, g, g])
-            seen[b] = math.log(share) if share > 0.0 else -np.inf
         uniform = abs(spans[p, 0] - spans[p, m // 2]) <= 1e-12 * spans[p, 0]
-        needed = (math.sqrt(a) + rate) / limits[0]
         turning = 0.0 if uniform else fastest / limits[2]
         since = 0.0 if sets_off[p] or kinked else since
         # equal parts as its end needs them, and these in halves
