@@ -147,11 +147,15 @@ def _moved(multipliers, places, coupled, functions):
             beside[i] = beside[i] or (told[i] and not told[j] and coupled[j, i])
     for q in range(motions):
         mu, own = multipliers[q], functions[q]
-        left_out = np.zeros(mu.shape[0], dtype=np.bool_)
+        left_out, moved, size = np.zeros(mu.shape[0], dtype=np.bool_), np.empty_like(mu), 0
         for i in range(count):
             if told[i]:
                 left_out[places[q, i]] = True
-        moved = mu[~left_out]
+        for i in range(mu.shape[0]):
+            if not left_out[i]:
+                moved[size] = mu[i]
+                size += 1
+        moved = moved[:size]
         multiply(moved, own)
         for i in range(count):
             for j in range(moved.shape[0] if beside[i] else 0):

@@ -48,7 +48,7 @@ from scipy.linalg import lapack
 from suboctave.floquet.blocks import form_of, forms_along, in_blocks
 from suboctave.floquet.exponentials import TURNS, structure
 from suboctave.floquet.propagate import closed, march, multipliers_and_shifts, response
-from suboctave.floquet.resolution import ACCURACY, divided, longest_rest, states_needed
+from suboctave.floquet.resolution import ACCURACY, divided, longest_rest, states_needed, stretches
 from suboctave.floquet.result import FloquetResult
 from suboctave.floquet.time_mesh import (
     NODES,
@@ -211,14 +211,8 @@ class _Linearised:
         """The stiffnesses of pieces along the panels one after the other, those of their panels, and what of them no
         form of the structure has.
         """
-        held, self._stretch = self.base[self.active], np.zeros(len(self.spans), dtype=np.int64)
-        begins = np.zeros(1, dtype=np.int64)
-        self.loose = np.zeros_like(self.base)
-        if held.any():
-            changes = (held[:, 1:] != held[:, :-1]).any(axis=0)
-            changes.cumsum(out=self._stretch[1:])
-            begins = np.append(0, changes.nonzero()[0] + 1)
-        self._sequence = tuple(map(tuple, held[:, begins].T.tolist()))
+        held, self._stretch = stretches(self.base, self.active)
+        self._sequence, self.loose = tuple(map(tuple, held.tolist())), np.zeros_like(self.base)
         for r, stiffness in enumerate(self._sequence):
             if form_of(*self._structure, self._dynamic, stiffness) is None:
                 self.loose[:, self._stretch == r] = self.base[:, self._stretch == r]

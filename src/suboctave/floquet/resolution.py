@@ -25,6 +25,25 @@ _CHANGES = 4.0
 
 
 @kernel()
+def stretches(base, active):
+    """The stiffnesses (R, G) that contacts have on panels one after the other, base (C, P), and which of these each has,
+    (P,).
+    """
+    groups, panels = active.shape[0], base.shape[1]
+    number, count = np.zeros(panels, dtype=np.int64), 0
+    for p in range(1, panels):
+        for channel in active:
+            if base[channel, p] != base[channel, p - 1]:
+                count = number[p - 1] + 1
+        number[p] = count
+    held = np.empty((count + 1, groups))
+    for p in range(panels):
+        for g in range(groups):
+            held[number[p], g] = base[active[g], p]
+    return held, number
+
+
+@kernel()
 def longest_rest(spans, law, base, active, start):
     """The first of the panels in a row on which no channel has stiffness or damping and none begins with an event, and
     how long it takes to pass them: the longest such row.
@@ -229,7 +248,9 @@ def divided(
             if added >= MOST:
                 return panels, start
             if added == out.shape[0]:
-                out = np.concatenate((out, np.empty_like(out)))
+                grown = np.empty((2 * added, 4))
+                grown[:added] = out
+                out = grown
             out[added] = panels[p]
             out[added, 0] = panels[p, 0] + at * (panels[p, 1] - panels[p, 0])
             at = min(1.0, at + size) if at + size < 1.0 - 1e-9 else 1.0
