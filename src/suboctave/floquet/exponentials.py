@@ -187,7 +187,8 @@ def structure(spans, stretch, forms):
             s, wide, v = first[r, b], first[r, b + 1] - first[r, b], w[2 * b : 2 * b + 2]
             if wide == 0:
                 # behind the last block
-                v[:] = 0.0
+                for l in range(m * m):
+                    v[0, l] = v[1, l] = 0.0
                 continue
             # one number counts as a double one
             mean = 0.5 * (motion[r, b, 0, 0] + motion[r, b, wide - 1, wide - 1])

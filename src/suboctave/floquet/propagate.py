@@ -126,13 +126,11 @@ def _solve(reading, influence, total, values, acts, rows, count, moving, forced,
     """
     columns = total.shape[1]
     r, k, c = values[0], values[1], values[2]
-    for i in range(count):
-        seen[i] = reading[0, rows[i]]
-    np.dot(seen[:count], total, f[:count])
-    if moving:
+    for part in range(2 if moving else 1):
         for i in range(count):
-            seen[i] = reading[1, rows[i]]
-        np.dot(seen[:count], total, speed[:count])
+            for s in range(total.shape[0]):
+                seen[i, s] = reading[part, rows[i], s]
+        np.dot(seen[:count], total, speed[:count] if part > 0 else f[:count])
     for i in range(count):
         row = rows[i]
         for j in range(columns):
@@ -151,6 +149,15 @@ def _solve(reading, influence, total, values, acts, rows, count, moving, forced,
         if forced:
             f[i, columns - 1] += r[row]
     eliminate(a, f, count)
+
+
+@kernel(fastmath=_FAST, error_model="numpy")
+def _other_form(turn, total, room):
+    """The states (S, .) of one form as those of another, in place."""
+    np.dot(turn, total, room)
+    for s in range(total.shape[0]):
+        for j in range(total.shape[1]):
+            total[s, j] = room[s, j]
 
 
 @kernel(fastmath=_FAST, error_model="numpy")
@@ -211,8 +218,7 @@ def march(structures, stretch, forms, law, loose, kick, active, total, kept, act
         if begins:
             now = stretch[p]
             if forms.turning[now]:
-                np.dot(forms.turns[now], total, added)
-                total[:] = added
+                _other_form(forms.turns[now], total, added)
         first, driven = forms.first[now], forms.driven[now]
         for g in range(groups if kicked else 0):
             if kick[active[g], p] != 0.0:
@@ -225,7 +231,9 @@ def march(structures, stretch, forms, law, loose, kick, active, total, kept, act
                 for l in range(count):
                     into[s, l] = entering[d, s, rows[l]]
             np.dot(into, f[:count], added)
-            total += added
+            for s in range(size):
+                for j in range(columns):
+                    total[s, j] += added[s, j]
             for i in range(count if forced else 0):
                 for j in range(columns):
                     solved[p, rows[i], j] = f[i, j]
@@ -243,8 +251,7 @@ def march(structures, stretch, forms, law, loose, kick, active, total, kept, act
     if later:
         _turn(waiting, forms.first[now], 0, free, total)
     if forms.turning[now + 1]:
-        np.dot(forms.turns[now + 1], total, added)
-        total[:] = added
+        _other_form(forms.turns[now + 1], total, added)
 
 
 @kernel(fastmath=_FAST, error_model="numpy")

@@ -26,8 +26,8 @@ _CHANGES = 4.0
 
 @kernel()
 def stretches(base, active):
-    """The stiffnesses (R, G) that contacts have on panels one after the other, base (C, P), and which of these each has,
-    (P,).
+    """The stiffnesses (R, G) that contacts have on panels one after the other, and which of these each has, (P,); base
+    (C, P).
     """
     groups, panels = active.shape[0], base.shape[1]
     number, count = np.zeros(panels, dtype=np.int64), 0
@@ -123,7 +123,8 @@ def states_needed(
     """
     panels, m = spans.shape
     left, whole, time, acting = 0.0, _TINY, 0.0, False
-    held[:] = 0.0
+    for g in range(active.shape[0]):
+        held[0, g] = held[1, g] = 0.0
     for p in range(panels):
         length = 0.0
         for j in range(m):
@@ -170,7 +171,8 @@ def _forces(law, loose, active, p, rates, flexibility, stiffening, seen):
     `divided`.
     """
     a = rate = 0.0
-    seen[:] = 0.0
+    for b in range(seen.shape[0]):
+        seen[b] = 0.0
     for g in range(active.shape[0]):
         k = c = 0.0
         for j in range(p * (ORDER - 1), p * (ORDER - 1) + ORDER):
@@ -183,6 +185,16 @@ def _forces(law, loose, active, p, rates, flexibility, stiffening, seen):
     for b in range(seen.shape[0]):
         seen[b] = math.log(seen[b]) if seen[b] > 0.0 else -np.inf
     return math.sqrt(a) + rate
+
+
+@kernel()
+def _grown(rows):
+    """Room for twice as many rows."""
+    out = np.empty((2 * rows.shape[0], rows.shape[1]))
+    for i in range(rows.shape[0]):
+        for j in range(rows.shape[1]):
+            out[i, j] = rows[i, j]
+    return out
 
 
 @kernel()
@@ -248,10 +260,8 @@ def divided(
             if added >= MOST:
                 return panels, start
             if added == out.shape[0]:
-                grown = np.empty((2 * added, 4))
-                grown[:added] = out
-                out = grown
-            out[added] = panels[p]
+                out = _grown(out)
+            out[added, 2], out[added, 3] = panels[p, 2], panels[p, 3]
             out[added, 0] = panels[p, 0] + at * (panels[p, 1] - panels[p, 0])
             at = min(1.0, at + size) if at + size < 1.0 - 1e-9 else 1.0
             out[added, 1] = panels[p, 0] + at * (panels[p, 1] - panels[p, 0])
