@@ -56,24 +56,28 @@ def displacement(state, direction, tau):
 def exact(system, directions, state):
     """The product of exponentials between the instants at which contacts begin and end."""
     _, damping, stiffness = system.matrices()
-    zero, one = np.zeros_like(stiffness), np.eye(system.n)
+    contacts = [(state.x @ d, gap, STIFFNESS * np.outer(d, d)) for d, gap in zip(directions, GAPS, strict=False)]
+    return product(damping, stiffness, contacts, state.rate)
+
+
+def product(damping, stiffness, contacts, rate):
+    """Multipliers of modes with unit masses; contacts: coefficients of a displacement, gap, what a contact adds."""
+    zero, one = np.zeros_like(stiffness), np.eye(len(stiffness))
     grid, instants = np.linspace(0.0, 2.0 * np.pi, 2001), []
-    for d, gap in zip(directions, GAPS, strict=False):
 
-        def beyond(tau, d=d, gap=gap):
-            return displacement(state, d, tau) - gap
+    def beyond(tau, c, gap):
+        k = np.arange(1, len(c) // 2 + 1)
+        return c[0] + np.cos(tau * k) @ c[1::2] + np.sin(tau * k) @ c[2::2] - gap
 
-        for i in np.flatnonzero(np.diff(np.sign([beyond(tau) for tau in grid]))):
-            instants.append(brentq(beyond, grid[i], grid[i + 1], xtol=1e-15))
+    for c, gap, _ in contacts:
+        for i in np.flatnonzero(np.diff(np.sign([beyond(tau, c, gap) for tau in grid]))):
+            instants.append(brentq(beyond, grid[i], grid[i + 1], (c, gap), xtol=1e-15))
     assert instants
     instants.sort()
-    result = np.eye(2 * system.n)
+    result = np.eye(2 * len(stiffness))
     for a, b in zip(instants, [*instants[1:], instants[0] + 2.0 * np.pi], strict=True):
-        k = stiffness.copy()
-        for d, gap in zip(directions, GAPS, strict=False):
-            if displacement(state, d, 0.5 * (a + b)) > gap:
-                k += STIFFNESS * np.outer(d, d)
-        result = expm(np.block([[zero, one], [-k, -damping]]) * (b - a) / state.rate) @ result
+        k = stiffness + sum(added for c, gap, added in contacts if beyond(0.5 * (a + b), c, gap) > 0.0)
+        result = expm(np.block([[zero, one], [-k, -damping]]) * (b - a) / rate) @ result
     return np.linalg.eigvals(result)
 
 
@@ -122,6 +126,27 @@ def test_all_modes_with_states(kind, monkeypatch):
         assert len(motion.spans) < 40
         difference, _ = differences(mu, errors, exact(system, directions, state))
         assert difference.max() < 1e-11
+
+
+def test_a_plate_with_five_stops(monkeypatch):
+    """All multipliers of its projection are those of the product of exponentials."""
+    pytest.importorskip("skfem")
+    monkeypatch.setattr(monodromy, "_NEGLECTED", (0.0, 0.0))
+    plate = so.structures.clearance_plate(12, 8, stops=5)
+    orbit = so.frequency_response(plate, (2.2, 2.19), harmonics=15).orbits[-1]
+    state = orbit.balance.at(orbit.x, orbit.omega)
+    mass, damping, stiffness = state.linear.equation_of_motion()
+    gap, held = plate.parameters["gap"], plate.parameters["Kc"]
+    contacts = [
+        (state.x @ group.inputs[0], gap, state.linear.expand(group.direction)) for group in state.balance.groups
+    ]
+    inverse = np.linalg.inv(mass)
+    contacts = [(c, gap, held * inverse @ np.outer(d, d)) for c, gap, d in contacts]
+    motion, mu, errors = before(state)
+    assert len(motion.spans) < 40
+    difference, _ = differences(mu, errors, product(inverse @ damping, inverse @ stiffness, contacts, state.rate))
+    assert len(difference) >= 10
+    assert difference.max() < 1e-10
 
 
 def test_masses_that_move_freely_while_others_are_in_contact():
