@@ -23,6 +23,7 @@ ROOMS = [
     "structures",
     "timedomain",
     "harmonic",
+    "projection",
     "continuation",
     "floquet",
     "bifurcation",

@@ -241,7 +241,7 @@ def _motion(catalogue: Catalogue, one: Any) -> tuple[Array, int]:
     has = {**parameters, "omega": one.omega}
     for name in _differences(catalogue, has):
         raise InputError(f"attractors: {one!r} has {name}={has[name]:.9g}, not {catalogue.wanted[name]:.9g}")
-    return np.asarray(state, dtype=float), int(nu)
+    return catalogue.system.reduced(state), int(nu)
 
 
 def _differences(catalogue: Catalogue, has: Mapping[str, float]) -> list[str]:
@@ -260,8 +260,8 @@ def _crossings(catalogue: Catalogue, branch: Curve) -> list[tuple[Array, int]]:
     for i in range(len(at) - 1):
         if at[i] == 0.0 or at[i] * at[i + 1] < 0.0:
             share = at[i] / (at[i] - at[i + 1]) if at[i] != at[i + 1] else 0.0
-            first, second = orbits[i].start(), orbits[i + 1].start()
+            first, second = (catalogue.system.reduced(orbits[k].start()) for k in (i, i + 1))
             crossings.append((first + share * (second - first), orbits[i].basis.nu))
     if len(at) and at[-1] == 0.0:
-        crossings.append((orbits[-1].start(), orbits[-1].basis.nu))
+        crossings.append((catalogue.system.reduced(orbits[-1].start()), orbits[-1].basis.nu))
     return crossings

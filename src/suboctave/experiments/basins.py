@@ -10,20 +10,29 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, Unpack
+from typing import Annotated, Any, Self, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
-from suboctave.errors import InputError, path_of, suggest
+from suboctave.errors import InputError, path_of
 from suboctave.experiments.basin_attractors import BasinAttractor, Catalogue, Given, enter_attractors, read_attractors
-from suboctave.experiments.common import BasinOptions, On, TimeResult, checked_integration, coordinates
+from suboctave.experiments.common import (
+    BasinOptions,
+    On,
+    TimeResult,
+    check_plane,
+    checked_integration,
+    coordinates,
+    of_structures,
+)
 from suboctave.experiments.poincare import attractor_of
 from suboctave.interruption import Interruption
 from suboctave.model.elements.base import Array
 from suboctave.model.inputs import check_count, check_omega, check_range, start_state, timed
+from suboctave.model.projected import coordinates_of
 from suboctave.model.system import System, describe
 from suboctave.options import with_options
 from suboctave.progress import Report, reporting
@@ -43,7 +52,7 @@ _CLASSIFIED = 60
 _OTHERS = {APERIODIC: "aperiodic", GONE: "left the range", OPEN: "not computed"}
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class Basins(TimeResult):
     """Basins of attraction on a plane of states at phase 0 of the load.
 
@@ -127,14 +136,14 @@ class Basins(TimeResult):
 
     def _derived(self) -> Mapping[str, Any]:
         known, one = self.attractors, ("attractor",)
-        points = np.vstack([np.zeros((0, 2 * self.system.n)), *(one.points for one in known)])
+        points = np.vstack([np.zeros((0, 2 * self.integrated.n)), *(coordinates_of(one.points) for one in known)])
         errors = {"standard_error": self.standard_errors, "grid_error": self.grid_errors}
         return {
             "period": (one, np.array([one.period for one in known], dtype=int)),
             "amplitude": (one, np.array([one.amplitude for one in known])),
             "given": (one, np.array([one.given for one in known], dtype=bool)),
             "multipliers": (("attractor", "multiplier"), padded([one.multipliers for one in known], complex)),
-            "points": (("section", "state"), points),
+            "points": (("section", "state"), self.integrated.recovered(points)),
             "point_of": (("section",), np.repeat(np.arange(len(known)), [one.period for one in known]).astype(int)),
             **{name: ("kind", np.array(list(by.values()))) for name, by in ({"share": self.shares} | errors).items()},
             "attractor": ("attractor", np.array([one.name for one in known], dtype=str)),
@@ -142,6 +151,12 @@ class Basins(TimeResult):
             "plane_x": self.plane[0],
             "plane_y": self.plane[1],
         }
+
+    def recovered(self, lost: float = 0.0) -> Self:
+        """See `TimeResult.recovered`; traps stay in the coordinates."""
+        small = self.system
+        self.attractors = [replace(one, points=small.recovered(one.points)) for one in self.attractors]
+        return super().recovered(lost)
 
     def _recorded(self) -> Mapping[str, Any]:
         return {"traps": [[tuple(vars(trap).values()) for trap in one.traps] for one in self.attractors]}
@@ -178,7 +193,7 @@ class Basins(TimeResult):
         marks = [one.points[:, columns] for one in self.attractors] if self.system.n == 1 else None
         return super().plot(path, **{"points": marks, **options})
 
-    def __repr__(self) -> str:
+    def _in_words(self) -> str:
         shares = ", ".join(f"{name} {share:.4f} +- {self.grid_errors[name]:.1g}" for name, share in self.shares.items())
         return (
             f"Basins({len(self.x)} x {len(self.y)} states at omega={self.omega:.8g}: {shares}"
@@ -188,6 +203,7 @@ class Basins(TimeResult):
 
 @with_options(BasinOptions)
 @timed
+@of_structures
 def basins(
     system: System,
     *,
@@ -260,30 +276,6 @@ def basins(
     )  # fmt: skip
     result.interruption = interruption
     return result
-
-
-def check_plane(system: System, plane: Any, observe: int) -> tuple[int, int]:
-    """The two coordinates as numbers in the state, or `InputError`."""
-    if plane is None:
-        return observe, system.n + observe
-    if not (isinstance(plane, tuple | list) and len(plane) == 2):
-        raise InputError(f'plane={plane!r}: name two coordinates of the state, such as ("x_0", "v_0")')
-    names = coordinates(system)
-    read = []
-    for one in plane:
-        if isinstance(one, str):
-            if one not in names:
-                raise InputError(f"plane: there is no coordinate {one!r}{suggest(one, names)}")
-            read.append(names.index(one))
-        elif isinstance(one, int | np.integer) and not isinstance(one, bool) and 0 <= one < len(names):
-            read.append(int(one))
-        else:
-            raise InputError(
-                f"plane: {one!r} is no coordinate: a name such as x_0, or a number from 0 to {len(names) - 1}"
-            )
-    if read[0] == read[1]:
-        raise InputError(f"plane={plane!r} names one coordinate twice")
-    return read[0], read[1]
 
 
 def _box(box: Any) -> list[tuple[float, float]]:

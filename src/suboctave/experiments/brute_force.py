@@ -20,17 +20,20 @@ from suboctave.experiments.common import (
     FEW,
     Integration,
     On,
+    PeaksOn,
     SectionOptions,
     StatesOn,
     TimeResult,
     checked_integration,
+    of_structures,
     starting_states,
     varied_grid,
 )
-from suboctave.experiments.poincare import Attractor, attractor_of
+from suboctave.experiments.poincare import Attractor, attractor_of, observed_in, recovered_attractor
 from suboctave.interruption import Interruption
 from suboctave.model.elements.base import Array
 from suboctave.model.inputs import check_count, start_state, timed
+from suboctave.model.projected import coordinates_of
 from suboctave.model.system import System
 from suboctave.options import with_options
 from suboctave.progress import Report, reporting
@@ -41,7 +44,7 @@ _CARRIED = ("up", "down")
 _STARTS = (*_CARRIED, "rest")
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class BruteForceDiagram(TimeResult):
     """Stroboscopic points over a parameter, for S ways to start and V values.
 
@@ -67,7 +70,7 @@ class BruteForceDiagram(TimeResult):
     values: Annotated[Array, On("value", name="value")]
     starts: Annotated[tuple[str, ...], On("start", name="start")]
     points: Annotated[Array, StatesOn("start", "value", "section")]
-    largest: Annotated[Array, On("start", "value", "section", "dof")]
+    largest: Annotated[Array, PeaksOn("start", "value", "section", "dof")]
     complete: bool
     omega: float | None
     transient: int
@@ -79,7 +82,7 @@ class BruteForceDiagram(TimeResult):
     @cached_property
     def attractors(self) -> list[list[Attractor | None]]:
         """S lists of V attractors, None where the trajectory left the range of numbers or was not computed."""
-        rows = zip(self.points, self.largest, strict=True)
+        rows = zip(coordinates_of(self.points), coordinates_of(self.largest), strict=True)
         return [[self._attractor(*one) for one in zip(self.values, *row, strict=True)] for row in rows]
 
     def _attractor(self, value: float, points: Array, largest: Array) -> Attractor | None:
@@ -87,7 +90,9 @@ class BruteForceDiagram(TimeResult):
             return None
         at = {**self.system.parameters, **({} if self.omega is None else {self.name: float(value)})}
         omega = float(value) if self.omega is None else self.omega
-        return attractor_of(self.system, points, largest, omega, at, self.tolerance, self.observed)
+        observed = observed_in(self.projection, self.observed)
+        one = attractor_of(self.integrated, points, largest, omega, at, self.tolerance, observed)
+        return recovered_attractor(one, self.projection)
 
     @property
     def period(self) -> NDArray[np.int_]:
@@ -127,7 +132,7 @@ class BruteForceDiagram(TimeResult):
         """
         return super().plot(path, curves=curves, **options)
 
-    def __repr__(self) -> str:
+    def _in_words(self) -> str:
         counts = []
         for period in sorted({int(p) for p in self.period.ravel() if p >= 0}, key=lambda p: (p == 0, p)):
             name = "aperiodic" if period == 0 else "T" if period == 1 else f"{period}T"
@@ -140,6 +145,7 @@ class BruteForceDiagram(TimeResult):
 
 @with_options(SectionOptions)
 @timed
+@of_structures
 def brute_force_diagram(
     system: System,
     omega: Any,

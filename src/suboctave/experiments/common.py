@@ -1,14 +1,28 @@
-"""What experiments in time share: starts, counts, grids and options that are checked, forces without jumps,
-and results that can be saved, loaded and written as a table.
+"""What experiments in time share: starts, counts, grids and options that are checked, forces without jumps, large
+structures in few coordinates, and results that can be saved, loaded and written as a table.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import functools
+import inspect
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeAlias, get_args, get_origin, get_type_hints
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    ClassVar,
+    ParamSpec,
+    Self,
+    TypeAlias,
+    TypeVar,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +30,18 @@ from numpy.typing import NDArray
 from suboctave.errors import InputError, is_number, shortened, suggest
 from suboctave.model.elements.base import Array, numbers_of
 from suboctave.model.elements.coupled import as_coupled
-from suboctave.model.inputs import check_count, check_is_system, check_parameter, check_range, observed_dof
+from suboctave.model.inputs import (
+    check_count,
+    check_is_system,
+    check_parameter,
+    check_range,
+    observed_dof,
+    start_state,
+)
+from suboctave.model.projected import ProjectedSystem, Recovered, lost_in_words, project
 from suboctave.model.system import System
 from suboctave.options import RunOptions
+from suboctave.projection import in_basis, small_system
 from suboctave.store.plain import Recorded, flat, recorded, written_system
 from suboctave.store.registry import Codec, Datasets, Stored, register
 from suboctave.store.table import Table, write_csv
@@ -41,13 +64,24 @@ _SAMPLES = {"accurate": 200, "newmark": 1000}
 
 
 # ----------------------------------------------------------------------------------------------------------- options
-class ParallelOptions(RunOptions, total=False):
+class TimeOptions(RunOptions, total=False):
+    """How a large structure is integrated."""
+
+    linear: Annotated[
+        Any,
+        "The linear part whose projection a structure of more than 40 degrees of freedom is integrated in, as "
+        "`condense` gives it (default: for 15 harmonics of the highest omega); `StructuralMatrices(system)` for all of "
+        "its degrees of freedom.",
+    ]
+
+
+class ParallelOptions(TimeOptions, total=False):
     """Options of verbs that follow trajectories side by side."""
 
     workers: Annotated[int | None, "Threads; default as many as there are processors. Results do not depend on it."]
 
 
-class RecognitionOptions(RunOptions, total=False):
+class RecognitionOptions(TimeOptions, total=False):
     """How finely a motion is integrated, and how its period is recognised."""
 
     tolerance: Annotated[
@@ -120,8 +154,132 @@ def starting_states(system: System, states: Any) -> Array:
 
 
 def coordinates(system: System) -> list[str]:
-    """Names of the entries of a state: `x_0 ... v_0 ...`."""
-    return [f"{kind}_{i}" for kind in "xv" for i in range(system.n)]
+    """Names of the entries of a state: `x_0 ... v_0 ...`; of a projected one those that are watched are named as in
+    the structure.
+    """
+    numbers: list[Any] = list(range(system.n))
+    if isinstance(system, ProjectedSystem):
+        numbers = [*system.watched, *(f"mode_{i}" for i in range(system.n - len(system.watched)))]
+    return [f"{kind}_{i}" for kind in "xv" for i in numbers]
+
+
+def watched_states(system: System, projection: ProjectedSystem | None) -> tuple[list[int], list[str]]:
+    """Which entries of a state a table has, and their names: all, of a projected structure those that are watched."""
+    dofs = list(range(system.n)) if projection is None else list(projection.watched)
+    return [*dofs, *(system.n + dof for dof in dofs)], [f"{kind}_{i}" for kind in "xv" for i in dofs]
+
+
+# -------------------------------------------------------------------------------------------------- large structures
+Arguments = ParamSpec("Arguments")
+Result = TypeVar("Result", bound="TimeResult")
+
+
+def of_structures(verb: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
+    """A verb in time that takes large structures too: it computes with the projection, its result is the structure's.
+
+    Here, and nowhere else, a structure is replaced: its states, observed degrees of freedom and planes by those of the
+    coordinates.
+    """
+    signature = inspect.signature(verb)
+
+    @functools.wraps(verb)
+    def computed(*positional: Arguments.args, **named: Arguments.kwargs) -> Result:
+        try:
+            bound = signature.bind(*positional, **named)
+        except TypeError:  # said better by Python
+            return verb(*positional, **named)
+        given, options = bound.arguments, bound.arguments.get("options", {})
+        system, linear = given["system"], options.pop("linear", None)
+        omega = _highest(given.get("omega"))
+        if not isinstance(system, System) or omega is None:  # refused by the verb
+            return verb(*positional, **named)
+        watched = _watched(system, given, options)
+        if linear is None:
+            small = small_system(system, omega, watched, _varied(system, given))
+        else:
+            small = _own(system, linear, watched)
+        if not isinstance(small, ProjectedSystem):
+            return verb(*bound.args, **bound.kwargs)
+        given["system"], lost = small, 0.0
+        for name in ("state", "states", "rest"):
+            if given.get(name) is not None:
+                states = given[name]
+                several = name == "states" and isinstance(states, list | tuple | np.ndarray) and np.ndim(states) == 2
+                states = starting_states(system, states) if several else start_state(system, states)
+                lost = max([lost, *(small.energy_outside(one) for one in np.atleast_2d(states))])
+                given[name] = small.reduced(states)
+        if options.get("observe") is not None:
+            options["observe"] = small.coordinate(watched[0])
+        if given.get("plane") is not None:
+            names = coordinates(system)
+            given["plane"] = tuple(names[column] for column in check_plane(system, given["plane"], watched[0]))
+        if given.get("tap") is not None:
+            at, dof, change = given["tap"]
+            given["tap"] = at, small.coordinate(observed_dof(system, dof)), change
+        return verb(*bound.args, **bound.kwargs).recovered(lost)
+
+    return computed
+
+
+def _highest(omega: Any) -> float | None:
+    """The highest of the frequencies that were given; None for what is none."""
+    values = numbers_of(omega)
+    return float(values.max()) if values.size and np.isfinite(values).all() and values.max() > 0.0 else None
+
+
+def _own(system: System, linear: Any, watched: Sequence[int]) -> System:
+    """The system in the basis of a linear part that was given."""
+    if getattr(getattr(linear, "system", None), "n", None) != system.n:
+        raise InputError(f"linear={shortened(linear)}: give what `condense` makes of this system")
+    return in_basis(system, linear, watched)
+
+
+def _watched(system: System, given: Mapping[str, Any], options: Mapping[str, Any]) -> list[int]:
+    """The degrees of freedom that a verb looks at, the observed one first."""
+    dofs = [observed_dof(system, options.get("observe"))]
+    if given.get("plane") is not None:
+        dofs += [column % system.n for column in check_plane(system, given["plane"], dofs[0])]
+    tap = given.get("tap")
+    if isinstance(tap, tuple | list) and len(tap) == 3:
+        dofs.append(observed_dof(system, tap[1]))
+    return list(dict.fromkeys(dofs))
+
+
+def _varied(system: System, given: Mapping[str, Any]) -> dict[str, list[float]]:
+    """Ends and middle of the values that parameters have, by name."""
+    varied = dict(given["parameters"]) if isinstance(given.get("parameters"), Mapping) else {}
+    if given.get("values") is not None and isinstance(given.get("parameter"), str):
+        varied[given["parameter"]] = given["values"]
+    arrays = {name: numbers_of(values) for name, values in varied.items() if name in system.parameters}
+    return {
+        name: sorted({float(a.min()), 0.5 * float(a.min() + a.max()), float(a.max())})
+        for name, a in arrays.items()
+        if a.size and np.isfinite(a).all()
+    }
+
+
+def check_plane(system: System, plane: Any, observe: int) -> tuple[int, int]:
+    """The two coordinates as numbers in the state, or `InputError`."""
+    if plane is None:
+        return observe, system.n + observe
+    if not (isinstance(plane, tuple | list) and len(plane) == 2):
+        raise InputError(f'plane={plane!r}: name two coordinates of the state, such as ("x_0", "v_0")')
+    names = coordinates(system)
+    read = []
+    for one in plane:
+        if isinstance(one, str):
+            if one not in names:
+                raise InputError(f"plane: there is no coordinate {one!r}{suggest(one, names)}")
+            read.append(names.index(one))
+        elif isinstance(one, int | np.integer) and not isinstance(one, bool) and 0 <= one < len(names):
+            read.append(int(one))
+        else:
+            raise InputError(
+                f"plane: {one!r} is no coordinate: a name such as x_0, or a number from 0 to {len(names) - 1}"
+            )
+    if read[0] == read[1]:
+        raise InputError(f"plane={plane!r} names one coordinate twice")
+    return read[0], read[1]
 
 
 # ------------------------------------------------------------------------------------------------------------- grids
@@ -226,6 +384,15 @@ class StatesOn(On):
     """The axes of states (..., 2n), which are two variables of the dataset: displacement and velocity."""
 
 
+class PeaksOn(On):
+    """The axes of largest displacements (..., n)."""
+
+
+#: axes along which a structure has as many entries as degrees of freedom, or twice as many, and what they are called
+#: where its coordinates are written
+_WIDE = {"dof": "coordinate", "state": "state_coordinate"}
+
+
 def _entries(made: Any) -> Iterator[tuple[str, Any, On]]:
     """Where the fields of a class of results lie: arrays on their axes, numbers and texts as attributes."""
     for name, hint in get_type_hints(made, include_extras=True).items():
@@ -246,10 +413,43 @@ class TimeResult(Stored):
     picture: ClassVar[str]
     in_record: ClassVar[Mapping[str, type]] = {}
     system: System
+    #: what a large structure was integrated as, None for one that was taken as it is
+    projection = None  # type: ProjectedSystem | None
+    #: share of the energy of the states at the start that did not fit into it
+    lost = 0.0
 
     def __init_subclass__(cls) -> None:
         if "contents" in cls.__dict__:
             register(Codec(cls.contents, cls, _write, partial(_read, cls)))
+
+    @property
+    def integrated(self) -> System:
+        """The system that was integrated: `projection`, or `system`."""
+        return self.system if self.projection is None else self.projection
+
+    def recovered(self, lost: float = 0.0) -> Self:
+        """This result of a `ProjectedSystem` as that of its structure: arrays are recovered as they are read."""
+        small = self.system
+        assert isinstance(small, ProjectedSystem)
+        for field, _, place in _entries(type(self)):
+            value = getattr(self, field)
+            if isinstance(place, PeaksOn):
+                setattr(self, field, small.recovered_peaks(value))
+            elif isinstance(place, StatesOn) or _WIDE.keys() & set(place.axes):
+                setattr(self, field, small.recovered(value))
+            elif field == "observed":
+                self.observed = small.watched[value]
+        self.projection, self.lost, self.system = small, lost, small.structure
+        return self
+
+    def __repr__(self) -> str:
+        if self.projection is None:
+            return self._in_words()
+        return f"{self._in_words()}\n  {self.projection.words}{lost_in_words(self.lost)}"
+
+    def _in_words(self) -> str:
+        """The result in a line."""
+        raise NotImplementedError
 
     def to_dataframe(self) -> pandas.DataFrame:
         """The result as a table; the class says what its rows are."""
@@ -289,6 +489,10 @@ class TimeResult(Stored):
 
     def to_xarray(self) -> xarray.Dataset:
         """The result as a labelled dataset, with what produced it (variables: docs/results.md)."""
+        return self._dataset()
+
+    def _dataset(self, projected: bool = False) -> xarray.Dataset:
+        """The dataset; `projected`: with the coordinates of what is recovered, and the basis."""
         import xarray
 
         n, values = self.system.n, getattr(self, "parameters", self.system.parameters)
@@ -297,7 +501,7 @@ class TimeResult(Stored):
         for field, _, place in _entries(type(self)):
             value = getattr(self, field)
             if isinstance(place, StatesOn):
-                parts = {"displacement": value[..., :n], "velocity": value[..., n:]}
+                parts = dict(zip(("displacement", "velocity"), halves(value, n), strict=True))
                 arrays |= {name: ((*place.axes, "dof"), part) for name, part in parts.items()}
             elif place.axes:
                 arrays[place.name or field] = place.axes, value
@@ -307,6 +511,12 @@ class TimeResult(Stored):
         for name, value in self._derived().items():
             (arrays if isinstance(value, tuple) else own)[name] = value
         produced = {"dofs": n, "system": self.system.name, "suboctave": __version__}
+        if self.projection is not None:
+            produced["projection"] = self.projection.words + lost_in_words(self.lost)
+        if projected and self.projection is not None:
+            arrays = {name: _as_kept(*entry) for name, entry in arrays.items()}
+            arrays |= {"shapes": (("dof", "coordinate"), self.projection.shapes)}
+            arrays |= {"read": (("read", "dof"), self.projection.read)}
         attributes = {"contents": self.contents, **own, **produced}
         dataset = xarray.Dataset(dict(flat(arrays)), coords={"parameter": list(values)}, attrs=attributes)
         if "dof" in dataset.dims:
@@ -314,12 +524,34 @@ class TimeResult(Stored):
         return dataset
 
 
+def halves(states: Any, n: int) -> tuple[Any, Any]:
+    """Displacements and velocities (..., n) of states (..., 2n)."""
+    if not isinstance(states, Recovered):
+        return states[..., :n], states[..., n:]
+    r = states.shapes.shape[1]
+    parts = states.coordinates[..., :r], states.coordinates[..., r:]
+    return Recovered(parts[0], states.shapes), Recovered(parts[1], states.shapes)
+
+
+def _as_kept(axes: Any, values: Any, *rest: Any) -> tuple[Any, ...]:
+    """A variable with coordinates in the place of what is recovered from them."""
+    if not isinstance(values, Recovered):
+        return axes, values, *rest
+    return tuple(_WIDE.get(axis, axis) for axis in axes), values.coordinates, *rest
+
+
 # ------------------------------------------------------------------------------------------------------------- files
 def _write(item: TimeResult) -> dict[str, xarray.Dataset]:
-    """The dataset of `to_xarray`, and besides `record`: JSON with the system and what is no array."""
+    """The dataset of `to_xarray`, and besides `record`: JSON with the system and what is no array.
+
+    Of a projected structure the coordinates and the basis, from which all else is recovered.
+    """
     system, arrays = written_system(item.system)
     record = {"system": system, "seconds": float(item.seconds), **item._recorded()}
-    return {"": recorded(item.to_xarray(), record, "the system and what is no array, as JSON", arrays)}
+    if (small := item.projection) is not None:
+        own = {"watched": list(small.watched), "covers": small.covers, "error": small.error, "lost": item.lost}
+        record["projection"] = own
+    return {"": recorded(item._dataset(True), record, "the system and what is no array, as JSON", arrays)}
 
 
 def _read(made: Any, groups: Datasets, allow_code: bool, linear: Any) -> TimeResult:
@@ -338,6 +570,12 @@ def _read(made: Any, groups: Datasets, allow_code: bool, linear: Any) -> TimeRes
             given[field] = kind(stored.dataset.attrs[name])
     if "parameters" in made.__annotations__:
         given["parameters"] = dict(zip(map(str, stored["parameter"]), stored["parameters"].tolist(), strict=True))
-    result: TimeResult = made(**given, **made._from_record(stored), system=stored.system(stored.record["system"]))
+    system, lost = stored.system(stored.record["system"]), None
+    if (own := stored.record.get("projection")) is not None:
+        lost = own.pop("lost")
+        system = project(system, stored["shapes"], stored["read"], **own)
+        if "observed" in given:
+            given["observed"] = system.coordinate(given["observed"])
+    result: TimeResult = made(**given, **made._from_record(stored), system=system)
     result.seconds = float(stored.record["seconds"])
-    return result
+    return result if lost is None else result.recovered(lost)

@@ -28,7 +28,7 @@ from typing import Annotated, Any, ClassVar, Literal, Unpack, overload
 import numpy as np
 
 from suboctave.errors import ConvergenceError, InputError, check_numbers, shortened, suggest
-from suboctave.experiments.common import On, ParallelOptions, TimeResult, check_continuous
+from suboctave.experiments.common import On, ParallelOptions, TimeResult, check_continuous, of_structures
 from suboctave.experiments.poincare import state_sizes
 from suboctave.model.elements.base import Array
 from suboctave.model.inputs import check_count, check_omega, start_state, timed
@@ -46,7 +46,7 @@ _STRETCHES = 4
 _SURE, _LEAST = 5.0, 1e-5
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class LyapunovExponents(TimeResult):
     """Lyapunov exponents of the motion that a trajectory settles on.
 
@@ -99,7 +99,7 @@ class LyapunovExponents(TimeResult):
 
         It is of the size of rounding: larger means that the smallest exponents could not be resolved.
         """
-        if len(self.exponents) < 2 * self.system.n:
+        if len(self.exponents) < 2 * self.integrated.n:
             return np.nan
         largest = max(float(np.max(np.abs(self.exponents))), abs(self.divergence), np.finfo(float).tiny)
         return float(abs(self.exponents.sum() - self.divergence) / largest)
@@ -133,7 +133,7 @@ class LyapunovExponents(TimeResult):
             "exponent": self.exponents, "standard_error": self.standard_errors, "per_period": self.per_period,
         }  # fmt: skip
 
-    def __repr__(self) -> str:
+    def _in_words(self) -> str:
         values = ", ".join(
             f"{value:.5g} +- {error:.1g}"
             for value, error in zip(self.exponents[:4], self.standard_errors[:4], strict=True)
@@ -174,6 +174,7 @@ def lyapunov_exponents(
 
 @with_options(ParallelOptions)
 @timed
+@of_structures
 def lyapunov_exponents(
     system: System,
     state: Any = None,
@@ -374,7 +375,7 @@ class TwoTrajectories:
         return self.offset if isinstance(self.offset, tuple) else (float(self.offset),)
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class Separation(TimeResult):
     """How fast two trajectories parted, for many settings.
 
@@ -437,7 +438,7 @@ class Separation(TimeResult):
         setting = "steps_per_period" if self.method.integrator == "newmark" else "tolerance"
         return {setting: self.value, "offset": self.offset, "exponent": self.rates}
 
-    def __repr__(self) -> str:
+    def _in_words(self) -> str:
         low, high = np.nanpercentile(self.rates, [5, 95]) if np.isfinite(self.rates).any() else (np.nan, np.nan)
         return (
             f"Separation(exponent {self.exponent:.4g}, standard deviation {self.spread:.2g} over {len(self.rates)} "

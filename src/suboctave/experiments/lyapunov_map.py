@@ -16,6 +16,7 @@ from suboctave.experiments.common import (
     TimeResult,
     check_continuous,
     checked_range,
+    of_structures,
     varied_grid,
 )
 from suboctave.experiments.lyapunov import over_stretches, smooth_weights
@@ -45,7 +46,7 @@ class CriticalCurve(Protocol):
         """Values of a parameter along the curve."""
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class LyapunovMap(TimeResult):
     """The largest Lyapunov exponent over frequency and a parameter.
 
@@ -104,7 +105,7 @@ class LyapunovMap(TimeResult):
             lines.append((f"{curve.kind} of {period}", curve.omega, curve.parameter(self.name)))
         return super().plot(path, lines=lines, **options)
 
-    def __repr__(self) -> str:
+    def _in_words(self) -> str:
         share = float(self.chaotic.mean())
         return (
             f"LyapunovMap(omega from {self.omega[0]:g} to {self.omega[-1]:g}, {self.name} from {self.values[0]:g} to "
@@ -115,6 +116,7 @@ class LyapunovMap(TimeResult):
 
 @with_options(ParallelOptions)
 @timed
+@of_structures
 def lyapunov_map(
     system: System,
     omega: Any,

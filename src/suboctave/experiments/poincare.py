@@ -10,9 +10,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from suboctave.errors import InputError
-from suboctave.experiments.common import On, SectionOptions, StatesOn, TimeResult, checked_integration, coordinates
+from suboctave.experiments.common import (
+    On,
+    PeaksOn,
+    SectionOptions,
+    StatesOn,
+    TimeResult,
+    checked_integration,
+    of_structures,
+    watched_states,
+)
 from suboctave.model.elements.base import Array
 from suboctave.model.inputs import check_count, start_state, timed
+from suboctave.model.projected import ProjectedSystem, coordinates_of
 from suboctave.model.system import System
 from suboctave.options import with_options
 from suboctave.progress import reporting
@@ -22,7 +32,7 @@ from suboctave.timedomain.flow import Flow
 from suboctave.timedomain.period_recognition import extents, period_of, same_cycle
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class PoincareSections(TimeResult):
     """Stroboscopic points of B trajectories.
 
@@ -51,7 +61,7 @@ class PoincareSections(TimeResult):
     contents = "poincare sections"
     picture = "plot_sections"
     points: Annotated[Array, StatesOn("trajectory", "section")]
-    largest: Annotated[Array, On("trajectory", "section", "dof")]
+    largest: Annotated[Array, PeaksOn("trajectory", "section", "dof")]
     omega: Annotated[Array, On("trajectory")]
     varied: Mapping[str, Array]
     failed: Annotated[NDArray[np.bool_], On("trajectory")]
@@ -69,21 +79,26 @@ class PoincareSections(TimeResult):
         """What trajectory number `index` has settled on."""
         if not -len(self) <= index < len(self):
             raise InputError(f"there is no trajectory {index}: they are numbered from 0 to {len(self) - 1}")
+        return recovered_attractor(self._settled(index), self.projection)
+
+    def _settled(self, index: int) -> Attractor:
+        """The attractor of the system that was integrated."""
+        system = self.integrated
         values = {name: float(column[index]) for name, column in self.varied.items()}
         return attractor_of(
-            self.system,
-            self.points[index],
-            self.largest[index],
+            system,
+            coordinates_of(self.points)[index],
+            coordinates_of(self.largest)[index],
             float(self.omega[index]),
-            {**self.system.parameters, **values},
+            {**system.parameters, **values},
             self.tolerance,
-            self.observed,
+            observed_in(self.projection, self.observed),
         )
 
     @property
     def periods(self) -> NDArray[np.int_]:
         """(B,): the period of each in periods of the load, 0 where nothing repeats."""
-        return np.array([self.attractor(i).period for i in range(len(self))], dtype=int)
+        return np.array([self._settled(i).period for i in range(len(self))], dtype=int)
 
     @property
     def attractors(self) -> list[Attractor]:
@@ -98,7 +113,8 @@ class PoincareSections(TimeResult):
                 "brute_force_diagram"
             )
         kept = np.flatnonzero(self.finished & ~self.failed)
-        return distinct(self.system, [self.attractor(int(i)) for i in kept], self.tolerance)
+        found = distinct(self.integrated, [self._settled(int(i)) for i in kept], self.tolerance)
+        return [recovered_attractor(one, self.projection) for one in found]
 
     def _derived(self) -> Mapping[str, Any]:
         columns = [self.varied.get(name, np.full(len(self), v)) for name, v in self.system.parameters.items()]
@@ -119,22 +135,23 @@ class PoincareSections(TimeResult):
 
     def _columns(self) -> Mapping[str, Any]:
         count, sections, _ = self.points.shape
-        names = coordinates(self.system)
+        which, names = watched_states(self.system, self.projection)
         taken = ("trajectory", "omega", "section", *names, "period")
         varied = {"omega": self.omega} | {parameter_column(n, taken): v for n, v in self.varied.items()}
         columns: dict[str, Any] = {"trajectory": np.repeat(np.arange(count), sections)}
         columns |= {n: np.repeat(values, sections) for n, values in varied.items()}
         columns["section"] = np.tile(np.arange(sections), count)
-        columns |= {name: self.points[:, :, i].ravel() for i, name in enumerate(names)}
+        columns |= {name: self.points[:, :, i].ravel() for i, name in zip(which, names, strict=True)}
         return columns | {"period": np.repeat(self.periods, sections)}
 
-    def __repr__(self) -> str:
+    def _in_words(self) -> str:
         count, sections, _ = self.points.shape
         return f"PoincareSections({count} trajectories, {sections} points each after {self.transient} periods)"
 
 
 @with_options(SectionOptions)
 @timed
+@of_structures
 def poincare_sections(
     system: System,
     states: Any = None,
@@ -261,6 +278,20 @@ def attractor_of(
         dict(parameters),
         observe,
     )
+
+
+def observed_in(projection: ProjectedSystem | None, dof: int) -> int:
+    """Which coordinate of the system that was integrated the observed degree of freedom is."""
+    return dof if projection is None else projection.coordinate(dof)
+
+
+def recovered_attractor(one: Attractor, projection: ProjectedSystem | None) -> Attractor:
+    """An attractor of a projection as one of the structure."""
+    if projection is None:
+        return one
+    points: Any = projection.recovered(one.points)
+    largest: Any = projection.recovered_peaks(one.largest)
+    return replace(one, points=points, largest=largest, observed=projection.watched[one.observed])
 
 
 def distinct(system: System, all_of: Sequence[Attractor], tolerance: float) -> list[Attractor]:

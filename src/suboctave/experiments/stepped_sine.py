@@ -27,10 +27,12 @@ from suboctave.experiments.common import (
     ComplexArray,
     Integration,
     On,
+    PeaksOn,
     RecognitionOptions,
     TimeResult,
     checked_integration,
     checked_range,
+    of_structures,
 )
 from suboctave.experiments.poincare import attractor_of
 from suboctave.interruption import Interruption
@@ -47,6 +49,7 @@ _SAMPLES = 128
 
 @with_options(RecognitionOptions)
 @timed
+@of_structures
 def stepped_sine(
     system: System,
     omega: Any,
@@ -245,7 +248,7 @@ def _tap(system: System, tap: Any, grid: Array) -> tuple[float, int, float] | No
     return float(tap[0]), observed_dof(system, tap[1]), float(tap[2])
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class SteppedSine(TimeResult):
     """A virtual stepped-sine test in S directions over V frequencies.
 
@@ -284,7 +287,7 @@ class SteppedSine(TimeResult):
     multiples: Annotated[Array, On("multiple", name="multiple")]
     components: Annotated[ComplexArray, On("direction", "omega", "multiple", "dof", name="component")]
     response: Annotated[ComplexArray, On("direction", "omega", "dof")]
-    largest: Annotated[Array, On("direction", "omega", "dof")]
+    largest: Annotated[Array, PeaksOn("direction", "omega", "dof")]
     period: Annotated[NDArray[np.int_], On("direction", "omega")]
     ends: Annotated[Array, On("direction", "omega", "state")]
     tapped: Annotated[Array, On("direction")]
@@ -335,7 +338,7 @@ class SteppedSine(TimeResult):
         """
         return super().plot(path, curves=curves, measured=measured, **options)
 
-    def __repr__(self) -> str:
+    def _in_words(self) -> str:
         done, settled = int((self.period >= 0).sum()), int((self.period > 0).sum())
         taps = [f", tapped at omega = {w:.6g} on the way {d}" for w, d in zip(self.tapped, self.directions, strict=True)
                 if np.isfinite(w)]  # fmt: skip

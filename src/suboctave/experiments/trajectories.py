@@ -8,16 +8,25 @@ from typing import Annotated, Any, Unpack
 
 import numpy as np
 
-from suboctave.experiments.common import FEW, On, TimeResult, coordinates, steps_of
+from suboctave.experiments.common import (
+    FEW,
+    On,
+    PeaksOn,
+    TimeOptions,
+    TimeResult,
+    of_structures,
+    steps_of,
+    watched_states,
+)
 from suboctave.model.elements.base import Array
 from suboctave.model.inputs import check_count, check_omega, start_state, timed
 from suboctave.model.system import System
-from suboctave.options import RunOptions, with_options
+from suboctave.options import with_options
 from suboctave.progress import reporting
 from suboctave.timedomain.flow import Flow
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class Trajectory(TimeResult):
     """A motion in time.
 
@@ -47,7 +56,7 @@ class Trajectory(TimeResult):
     time: Annotated[Array, On("time")]
     displacement: Annotated[Array, On("time", "dof")]
     velocity: Annotated[Array, On("time", "dof")]
-    largest: Annotated[Array, On("dof")]
+    largest: Annotated[Array, PeaksOn("dof")]
     omega: float
     parameters: Mapping[str, float]
     steps_per_period: int
@@ -74,10 +83,12 @@ class Trajectory(TimeResult):
         return {"observed": self.system.observed_dof}
 
     def _columns(self) -> Mapping[str, Any]:
-        states = np.hstack([self.displacement, self.velocity])
-        return {"time": self.time, **dict(zip(coordinates(self.system), states.T, strict=True))}
+        which, names = watched_states(self.system, self.projection)
+        dofs = which[: len(which) // 2]
+        states = np.hstack([self.displacement[:, dofs], self.velocity[:, dofs]])
+        return {"time": self.time, **dict(zip(names, states.T, strict=True))}
 
-    def __repr__(self) -> str:
+    def _in_words(self) -> str:
         periods = (len(self.time) - 1) / self.steps_per_period
         dof = self.system.observed_dof
         return (
@@ -86,8 +97,9 @@ class Trajectory(TimeResult):
         )
 
 
-@with_options(RunOptions)
+@with_options(TimeOptions)
 @timed
+@of_structures
 def integrate(
     system: System,
     state: Any = None,
@@ -99,7 +111,7 @@ def integrate(
     parameters: Mapping[str, float] | None = None,
     method: str = "accurate",
     tolerance: float | None = None,
-    **options: Unpack[RunOptions],
+    **options: Unpack[TimeOptions],
 ) -> Trajectory:
     """Integrate the equation of motion in time, from phase 0 of the load over whole periods.
 

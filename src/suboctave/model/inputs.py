@@ -206,8 +206,10 @@ def _numbers(item: Any) -> Iterator[tuple[str, float]]:
     system = getattr(getattr(item, "orbit", item), "system", item)
     if isinstance(system, System):
         yield from system.parameters.items()
-        for name, matrix in zip(("mass", "damping", "stiffness"), system.matrices(), strict=True):
-            yield from ((name, float(entry)) for entry in matrix.ravel())
+        for matrix in (system.mass, system.damping, system.stiffness):
+            value = matrix.compact(system.parameters)
+            entries = value.data if matrix.sparse else value.ravel()
+            yield from ((matrix.what, float(entry)) for entry in entries)
         for where, source, _ in system.expressions():
             yield where, source.value({**system.parameters, "omega": 1.0})
     elif isinstance(item, int | float | np.floating):

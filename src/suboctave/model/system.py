@@ -268,6 +268,16 @@ class System:
         acting += [element.direction(self.n) for element in self.elements if element.depends_on_time]
         return int(np.argmax(np.abs(acting[0]))) if acting else 0
 
+    # -------------------------------------------------------------------------------------------------- projection
+    def reduced(self, states: Any) -> Array:
+        """States (..., 2 n) of the structure as states of this system; other ones in `ProjectedSystem` only."""
+        result: Array = np.asarray(states, dtype=float)
+        return result
+
+    def recovered(self, coordinates: Any) -> Any:
+        """What `reduced` is the inverse of; displacements (..., n) too."""
+        return coordinates
+
     # ------------------------------------------------------------------------------------------------------ object
     def __setattr__(self, name: str, value: Any = None) -> None:
         raise AttributeError("a System does not change; with_parameters() gives one with other parameters")

@@ -17,6 +17,7 @@ import numpy as np
 
 from suboctave.errors import InputError
 from suboctave.model.description import plain_number
+from suboctave.model.projected import Recovered
 from suboctave.model.system import System, build, describe
 
 if TYPE_CHECKING:
@@ -89,14 +90,41 @@ _PARTS = ("real", "imag")
 
 
 def flat(variables: Mapping[Any, Any]) -> Iterator[tuple[str, Any]]:
-    """Variables (dimensions, values, ...) with complex ones as pairs `..._real`, `..._imag`, objects as texts."""
+    """Variables (dimensions, values, ...) with complex ones as pairs `..._real`, `..._imag`, objects as texts.
+
+    What is recovered from coordinates stays so until it is read.
+    """
     for name, (dims, values, *attributes) in variables.items():
+        if isinstance(values, Recovered):
+            yield from _read_later(str(name), dims, values, attributes)
+            continue
         array = np.asarray(values)
         if array.dtype.kind == "c":
             for part in _PARTS:
                 yield f"{name}_{part}", (dims, getattr(array, part), *attributes)
         else:
             yield str(name), (dims, array.astype(str) if array.dtype.kind == "O" else array, *attributes)
+
+
+def _read_later(name: str, dims: Any, values: Recovered, attributes: Any) -> Iterator[tuple[str, Any]]:
+    from xarray.backends import BackendArray
+    from xarray.core import indexing
+
+    class Later(BackendArray):
+        """What an index of a variable asks for."""
+
+        def __init__(self, source: Recovered) -> None:
+            self.source, self.shape, self.dtype = source, source.shape, source.dtype
+
+        def __getitem__(self, key: indexing.ExplicitIndexer) -> Any:
+            support = indexing.IndexingSupport.BASIC
+            return indexing.explicit_indexing_adapter(key, self.shape, support, self.source.__getitem__)
+
+    parts = {name: values}
+    if values.dtype.kind == "c":
+        parts = {f"{name}_{part}": Recovered(getattr(values.coordinates, part), values.shapes) for part in _PARTS}
+    for own, part in parts.items():
+        yield own, (dims, indexing.LazilyIndexedArray(Later(part)), *attributes)
 
 
 def array_of(dataset: xarray.Dataset, name: str) -> np.ndarray:

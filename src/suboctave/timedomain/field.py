@@ -166,6 +166,12 @@ class Field:
             self._piecewise[key] = np.ascontiguousarray(matrix.T), constant
         return self._piecewise[key]
 
+    def linear_rate(self, active: NDArray[np.bool_]) -> Array:
+        """What the scaled state is multiplied by in its rate per unit of `tau`, (2n, 2n); all of it without smooth
+        laws.
+        """
+        return self._matrices(active)[0].T
+
     def right_hand_side(self, active: NDArray[np.bool_], slope: bool = False) -> RightHandSide:
         """The rate of the stacked rows per unit of `tau`, contacts frozen as in `active` (one flag per switch)."""
         matrix, constant = self._matrices(active)

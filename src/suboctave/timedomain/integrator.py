@@ -65,6 +65,8 @@ class Passage:
     steps: list[Step] = field(default_factory=list)
     tau: list[float] = field(default_factory=list)
     states: list[Array] = field(default_factory=list)
+    #: stretches between changes of switches: how long, in tau, and which act
+    stretches: list[tuple[float, NDArray[np.bool_]]] = field(default_factory=list)
 
 
 def _solver(rhs: Any, begin: float, y: Array, end: float, rtol: float, atol: float, first: float | None) -> DOP853:
@@ -230,10 +232,12 @@ def advance(
             at, y_at = watch.land(rhs, solver, change[0], change[1], rtol, atol)
             if at > solver.t_old:
                 _record(out, solver, at, y_at, watch, m, dense)
+            out.stretches.append((at - tau, watch.active.copy()))
             out.contacts.append(watch.change(at, change[1]))
             tau, y = at, y_at
             break
         else:
+            out.stretches.append((solver.t - tau, watch.active.copy()))
             tau, y = solver.t, solver.y
     out.y = y
     return out

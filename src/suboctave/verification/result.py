@@ -125,6 +125,8 @@ class BranchVerification(TimeResult):
         `VerifiedPoint` and `VerifiedBifurcation` of each that was looked at, in the order of the branch.
     complete
         False where an interruption left some out: `interruption`, Ctrl-C or a time limit.
+    basis
+        In which modes a large structure was integrated, and with which error; empty for one that was taken as it is.
     """
 
     branch: Branch
@@ -133,6 +135,7 @@ class BranchVerification(TimeResult):
     tolerance: float
     complete: bool
     interruption: Interruption | None = None
+    basis: str = ""
 
     @property
     def agrees(self) -> bool:
@@ -188,6 +191,7 @@ class BranchVerification(TimeResult):
             "tolerance": self.tolerance,
             "complete": int(self.complete),
             "said": self.summary,
+            "projection": self.basis,
             "system": self.branch.system.name,
             "suboctave": __version__,
         }
@@ -231,6 +235,7 @@ class BranchVerification(TimeResult):
     def __repr__(self) -> str:
         wrong = [*self.disagreements, *(b for b in self.bifurcations if not b.agrees)]
         lines = [f"BranchVerification: {self.summary}", *(f"  {one!r}" for one in wrong[:8])]
+        lines[1:1] = [f"  {self.basis}"] if self.basis else []
         if len(wrong) > 8:
             lines.append(f"  and {len(wrong) - 8} more")
         return "\n".join(lines)
@@ -265,7 +270,8 @@ def _read(groups: Datasets, allow_code: bool, linear: LinearPart | None) -> Bran
     ]
     attributes = stored.dataset.attrs
     tolerance, complete = float(attributes["tolerance"]), bool(attributes["complete"])
-    return BranchVerification(branch, tuple(points), tuple(events), tolerance, complete)
+    basis = str(attributes.get("projection", ""))
+    return BranchVerification(branch, tuple(points), tuple(events), tolerance, complete, basis=basis)
 
 
 register(Codec("verification", BranchVerification, _write, _read))

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from operator import index
 from typing import Any, overload
@@ -27,10 +27,14 @@ from suboctave.floquet.methods import StabilityMethod, method_of
 from suboctave.floquet.result import FloquetResult
 from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.harmonic.reduction import COMPLETE
 from suboctave.interruption import Interruption, limited
 from suboctave.kinds import KINDS
 from suboctave.model.elements.coupled import reads
+from suboctave.model.projected import ProjectedSystem
+from suboctave.model.system import System
 from suboctave.progress import reporting
+from suboctave.projection import in_basis
 from suboctave.results.branch import Branch, TrackedBranch
 from suboctave.timedomain import PeriodicSolution, integrate, locate_by_shooting, shoot
 from suboctave.timedomain.multiple_shooting import MultipleShooting, ShotMotions
@@ -47,8 +51,8 @@ from suboctave.verification.result import (
 LOCATED = ("LP", "BP", "PD", "NS")
 #: how far along the curve of motions one is searched, in tolerances, and the passes through it that may be spent
 _REACH, _PASSES = 100.0, 120
-#: degrees of freedom up to which motions are verified
-_MOST_DOFS = 400
+#: displacements of a motion that are held in memory at once
+_AT_ONCE = 10_000_000
 
 
 def stability(
@@ -90,7 +94,11 @@ class Verification:
         Whether shooting arrives at the same motion with the same verdict; at a bifurcation, where no verdict exists,
         whether it locates one of the same kind at the same place.
     solution
-        The motion found by shooting, None if it found none (`reason` says why).
+        The motion found by shooting, None if it found none (`reason` says why). Of a large structure its state is
+        that of all degrees of freedom, multipliers and monodromy matrix are those of the projection.
+    projection
+        What a large structure was integrated as, in the basis that the motion was solved in; None for one that was
+        taken as it is.
     """
 
     distance: float
@@ -99,40 +107,44 @@ class Verification:
     agrees: bool
     solution: PeriodicSolution | None
     reason: str
+    projection: ProjectedSystem | None = None
 
     def __repr__(self) -> str:
         verdict = "agrees" if self.agrees else "DISAGREES"
         errors = f"distance {self.distance:.1e}, multipliers {self.multiplier_error:.1e}"
-        return f"Verification: {verdict}; {errors}. {self.reason}"
+        basis = "" if self.projection is None else f"\n  {self.projection.words}"
+        return f"Verification: {verdict}; {errors}. {self.reason}{basis}"
 
 
 def verify_motion(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: float) -> Verification:
     """A motion against shooting, a bifurcation against its location by shooting (`verification.verify`)."""
     motion = _orbit(what)
-    system = motion.system
-    _check_whole(motion)
+    system = integrated_system([motion])
     floquet = what.floquet if isinstance(what, BranchPoint | Bifurcation) else stability(motion)
-    start = motion.start()
+    whole = motion.start()
+    start = system.reduced(whole)
+    projection = system if isinstance(system, ProjectedSystem) else None
     touches = isinstance(what, Bifurcation) and what.kind in CONTACT_KINDS
     kind = what.kind if isinstance(what, Bifurcation) and what.kind in LOCATED else None
     try:
         if kind is None:
             solution = shoot(system, start, motion.omega, periods=motion.basis.nu)
         else:
-            solution = _by_shooting(motion, kind, start, tolerance)
+            solution = _by_shooting(system, motion, kind, start, tolerance)
     except ConvergenceError as failure:
         what_failed = "shooting found no motion from here" if kind is None else "shooting did not locate it"
-        return Verification(math.inf, math.inf, None, False, None, f"{what_failed}: {failure}")
-    sizes = np.repeat(_largest(motion), system.n)
+        return Verification(math.inf, math.inf, None, False, None, f"{what_failed}: {failure}", projection)
+    sizes = np.repeat(_largest(motion), len(whole) // 2)
     # a motion at rest differs from another only if that one moves
-    distance = float(np.max(np.abs(solution.state - start) / np.maximum(sizes, np.finfo(float).tiny)))
+    away = np.asarray(system.recovered(solution.state)) - whole
+    distance = float(np.max(np.abs(away) / np.maximum(sizes, np.finfo(float).tiny)))
     distance = max(distance, abs(solution.omega - motion.omega) / motion.omega)
     if isinstance(what, Bifurcation) and touches:
-        distance = max(distance, distance_from_gap(what, solution.state, solution.omega))
+        distance = max(distance, distance_from_gap(system, what, solution.state, solution.omega))
     error = pairing(floquet.multipliers, solution.multipliers)
 
     def verdict(agrees: bool, reason: str) -> Verification:
-        return Verification(distance, error, solution.stable, agrees, solution, reason)
+        return Verification(distance, error, solution.stable, agrees, recovered_solution(system, solution), reason, projection)
 
     if kind is not None:
         words = f"Shooting finds {KINDS[kind].words} at omega = {solution.omega:.9g}"
@@ -151,16 +163,22 @@ def verify_motion(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: fl
     return verdict(True, "The same motion" if isinstance(what, TrackedEvent) else "The same motion, the same verdict")
 
 
-def _largest(motion: PeriodicOrbit) -> tuple[float, float]:
-    """The largest displacement and the largest velocity of a motion, of any DOF."""
-    t = np.linspace(0.0, motion.period, 8 * motion.basis.harmonics + 8)
-    return float(np.abs(motion.displacement(t)).max()), float(np.abs(motion.velocity(t)).max())
+def _largest(motion: PeriodicOrbit, system: System | None = None) -> tuple[float, float]:
+    """The largest displacement and the largest velocity of a motion, of any DOF, or of any coordinate of a system."""
+    n, largest = motion.balance.system.n, np.zeros(2)
+    instants = np.linspace(0.0, motion.period, 8 * motion.basis.harmonics + 8)
+    # so many at once that they fit into memory
+    for t in np.array_split(instants, 1 + len(instants) * n // _AT_ONCE):
+        state = np.hstack([motion.displacement(t).T, motion.velocity(t).T])
+        state = state if system is None else system.reduced(state)
+        largest = np.maximum(largest, [np.abs(part).max() for part in np.split(state, 2, axis=1)])
+    return float(largest[0]), float(largest[1])
 
 
-def distance_from_gap(what: Bifurcation, state: Array, omega: float) -> float:
+def distance_from_gap(system: System, what: Bifurcation, state: Array, omega: float) -> float:
     """Distance of the motion's nearest extremum from the gap that it should graze, in units of the displacement."""
     assert what.contact is not None
-    system, contact = what.orbit.system, what.contact
+    contact = what.contact
     period = 2.0 * math.pi * what.orbit.basis.nu / omega
     path = integrate(system, state, (0.0, period), omega)
     window = 0.5 * period / (what.orbit.basis.harmonics + 1)
@@ -176,21 +194,38 @@ def distance_from_gap(what: Bifurcation, state: Array, omega: float) -> float:
     return abs(value - contact.gap) / size
 
 
-def _check_whole(motion: PeriodicOrbit) -> None:
-    if motion.system.n > _MOST_DOFS:
-        raise InputError(
-            f"shooting integrates all degrees of freedom, and is for up to {_MOST_DOFS}; this system has "
-            f"{motion.system.n}: project it onto its lowest modes and what the forces deflect, and verify that"
-        )
+def integrated_system(motions: Sequence[PeriodicOrbit]) -> System:
+    """What shooting integrates: the system of motions of one curve, at the first one's parameters, or its projection.
+
+    That is the basis which the motions were solved in: shooting holds their harmonics against the same equation of
+    motion, and how far that is from the whole structure is what the error of the projection says.
+    """
+    first = motions[0]
+    if first.system.n <= COMPLETE:
+        return first.system
+    linear = first.state().linear
+    for motion in motions[1:]:
+        # a basis grows along a curve: the last one serves all of it
+        linear = linear.rebuilt(motion.values).covering(motion.omega * float(motion.basis.multiples[-1]))
+    return in_basis(first.system, linear, [first.system.observed_dof])
 
 
-def _by_shooting(motion: PeriodicOrbit, kind: str, start: Array, tolerance: float) -> PeriodicSolution:
+def recovered_solution(system: System, solution: PeriodicSolution) -> PeriodicSolution:
+    """A motion found by shooting as one of all degrees of freedom."""
+    if not isinstance(system, ProjectedSystem):
+        return solution
+    return replace(solution, state=system.recovered(solution.state)[:], dof=system.watched[solution.dof])
+
+
+def _by_shooting(
+    system: System, motion: PeriodicOrbit, kind: str, start: Array, tolerance: float
+) -> PeriodicSolution:
     """The bifurcation located by shooting, or the motion at the same omega.
 
     The latter where the search loses the multiplier but the count of unstable ones changes as it should within a tenth
     of the tolerance on either side.
     """
-    system, omega, periods = motion.system, motion.omega, motion.basis.nu
+    omega, periods = motion.omega, motion.basis.nu
     try:
         return locate_by_shooting(system, kind, start, omega, periods=periods, reach=_REACH * tolerance, budget=_PASSES)
     except ConvergenceError:
@@ -240,17 +275,16 @@ def _verify_branch(
     if not len(branch):
         raise InputError("the branch has no points to verify")
     which = _chosen(len(branch), points, every)
-    first = branch.points[0].orbit
-    _check_whole(first)
-    shots = Shots(first, workers)
+    items = list(branch.bifurcations.met) if bifurcations else []
+    orbits = [branch.points[i].orbit for i in which]
+    shots = Shots([*orbits, *(item.orbit for item in items)], workers)
     checked: list[VerifiedPoint] = []
     confirmed: list[VerifiedBifurcation] = []
-    items = list(branch.bifurcations.met) if bifurcations else []
     whole = len(which) + 4 * len(items)
     interruption: Interruption | None = None
     with reporting(progress, "verifying") as report, one_thread():
         try:
-            for i, shot in zip(which, shots.motions([branch.points[i].orbit for i in which]), strict=True):
+            for i, shot in zip(which, shots.motions(orbits), strict=True):
                 if report is not None:
                     report(len(checked) / whole, f"{len(checked)} of {len(which)} points")
                 checked.append(_judged(branch, i, shot, tolerance))
@@ -258,10 +292,13 @@ def _verify_branch(
             for done, item in enumerate(items):
                 if report is not None:
                     report((len(which) + 4 * done) / whole, f"{item.kind} at omega = {item.omega:.6g}")
-                confirmed.append(_confirmed(item, quick.get(id(item)), tolerance, branch.observe))
+                confirmed.append(_confirmed(shots.system, item, quick.get(id(item)), tolerance, branch.observe))
         except KeyboardInterrupt as cause:
             interruption = Interruption.of(cause)
-    return BranchVerification(branch, tuple(checked), tuple(confirmed), tolerance, interruption is None, interruption)
+    basis = shots.system.words if isinstance(shots.system, ProjectedSystem) else ""
+    return BranchVerification(
+        branch, tuple(checked), tuple(confirmed), tolerance, interruption is None, interruption, basis
+    )
 
 
 def _chosen(count: int, points: int | Iterable[int] | None, every: int) -> list[int]:
@@ -333,11 +370,13 @@ def _quick(shots: Shots, items: Sequence[Bifurcation], tolerance: float) -> dict
     return found
 
 
-def _confirmed(item: Bifurcation, shot: Shot | None, tolerance: float, observe: int) -> VerifiedBifurcation:
+def _confirmed(
+    system: System, item: Bifurcation, shot: Shot | None, tolerance: float, observe: int
+) -> VerifiedBifurcation:
     verdict = partial(VerifiedBifurcation, item.kind, item.omega, item.parameters, item.orbit.amplitude(observe))
     if shot is not None and shot.converged and shot.distance <= tolerance:
         if item.kind in CONTACT_KINDS:
-            along = distance_from_gap(item, shot.state, shot.omega)
+            along = distance_from_gap(system.moved_to(item.orbit.values), item, shot.state, shot.omega)
             words = "The same motion, and it just reaches the gap"
         else:
             along, words = abs(shot.along), f"Shooting finds {KINDS[item.kind].words} at omega = {shot.omega_there:.9g}"
@@ -371,11 +410,15 @@ class Shot:
 
 
 class Shots:
-    """Multiple shooting from motions of one system that have one period."""
+    """Multiple shooting from motions of one curve, which have one period.
 
-    def __init__(self, orbit: PeriodicOrbit, workers: int | None = None) -> None:
-        self.system = orbit.balance.system
-        self.shooting = MultipleShooting(self.system, orbit.basis.nu, workers)
+    Distances are those of displacements and velocities of all degrees of freedom, or of the coordinates of a
+    projection, which are displacements as well.
+    """
+
+    def __init__(self, orbits: Sequence[PeriodicOrbit], workers: int | None = None) -> None:
+        self.system = integrated_system(orbits)
+        self.shooting = MultipleShooting(self.system, orbits[0].basis.nu, workers)
 
     def motions(
         self, orbits: Sequence[PeriodicOrbit], kinds: Sequence[str] = (), reach: float | None = None
@@ -411,8 +454,8 @@ class Shots:
         states, sizes = [], []
         for orbit in orbits:
             t = share * orbit.period
-            states.append(np.hstack([orbit.displacement(t).T, orbit.velocity(t).T]))
-            x, v = _largest(orbit)
+            states.append(self.system.reduced(np.hstack([orbit.displacement(t).T, orbit.velocity(t).T])))
+            x, v = _largest(orbit, self.system)
             # a motion at rest has no size of its own
             sizes.append(np.repeat([x or 1.0, v or orbit.omega], self.system.n))
         values = {name: np.array([orbit.values[name] for orbit in orbits]) for name in self.system.parameters}
@@ -511,7 +554,11 @@ def verify(
     Raises
     ------
     InputError
-        If the orbit's unknowns are not all DOFs of its system (a condensed model has no state to shoot from).
+        If an element of a large structure does not say by directions where it acts.
+
+    A structure that harmonic balance projects (more than 40 degrees of freedom, few of which forces act on) is
+    integrated in the basis which the motion was solved in: the same equation of motion. How far that is from the whole
+    structure is printed with the result; multipliers are those of the projection.
 
     A bifurcation is looked for within a hundred tolerances along the curve of true motions, and given up after 120
     passes through the motion with its tangent flow: `reason` says so.

@@ -11,7 +11,8 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field
 
-from suboctave.experiments.basins import Basins as BasinsResult, basins, check_plane
+from suboctave.experiments.basins import Basins as BasinsResult, basins
+from suboctave.experiments.common import check_plane
 from suboctave.experiments.lyapunov import lyapunov_exponents
 from suboctave.experiments.stepped_sine import check_stepped_sine, stepped_sine
 from suboctave.model.inputs import check_range

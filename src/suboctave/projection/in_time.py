@@ -1,0 +1,62 @@
+"""The system that is integrated in the place of a large structure.
+
+What harmonic balance does with a structure is done here too: up to `reduction.COMPLETE` degrees of freedom, and where
+forces act along all of them, it is taken as it is; beyond, it is projected onto the basis that `reduction` grows for the
+directions of its elements and loads and for the observed degrees of freedom. A motion in time has no highest harmonic:
+the basis is made for `HARMONICS` of them, as that of `condense`, and what lies above is known as well as the basis
+happens to have it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import product
+
+import numpy as np
+
+from suboctave.harmonic.basis import Array
+from suboctave.harmonic.condensed import Condensed, acting, independent, linear_part_of
+from suboctave.harmonic.linear_part import LinearPart
+from suboctave.harmonic.reduction import COMPLETE
+from suboctave.model.projected import coordinates_along, project
+from suboctave.model.system import System
+
+#: multiples of the load's highest frequency that the basis is made for
+HARMONICS = 15
+
+
+def small_system(
+    system: System, omega: float, watched: Sequence[int], varied: Mapping[str, Sequence[float]] | None = None
+) -> System:
+    """A system as it is integrated: itself, or a `ProjectedSystem` in its place.
+
+    Parameters
+    ----------
+    omega
+        Highest circular frequency of the load, rad per unit time.
+    watched
+        Degrees of freedom whose motion is looked at; they are coordinates.
+    varied
+        Values of parameters between which those of the computation lie, by name.
+    """
+    if system.n <= COMPLETE:
+        return system
+    linear = linear_part_of(system, None, (HARMONICS + 0.5) * omega, None, watched)
+    inside = system.mass.names | system.damping.names | system.stiffness.names
+    names = [name for name in varied or {} if name in inside]
+    for values in product(*((varied or {})[name] for name in names)) if names else ():
+        # the basis grows by what it needs there, and keeps what it has
+        linear = linear.rebuilt({**system.parameters, **dict(zip(names, values, strict=True))})
+    return in_basis(system, linear, watched)
+
+
+def in_basis(system: System, linear: LinearPart, watched: Sequence[int]) -> System:
+    """A system in the basis of its linear part, or itself where that has none of its own."""
+    if not isinstance(linear, Condensed) or linear.projected.shapes is None:
+        return system
+    shapes, dofs = linear.projected.shapes, list(dict.fromkeys(int(dof) for dof in watched))
+    units: list[Array] = [np.eye(1, system.n, dof)[0] for dof in dofs]
+    read = independent([*units, *acting(system)])
+    mass, _, stiffness = linear.equation_of_motion()
+    basis = coordinates_along(shapes, read, (mass, stiffness), dofs)
+    return project(system, basis, read, dofs, linear.covers, linear.error)
