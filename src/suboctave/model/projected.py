@@ -108,9 +108,7 @@ class ProjectedSystem(System):
         return min(energy(*np.split(state - inside, 2)) / whole, 1.0) if whole > 0.0 else 0.0
 
     def _changed(self, **parts: Any) -> System:
-        return project(
-            self.structure._changed(**parts), self.shapes, self.read, self.watched, self.covers, self.error
-        )
+        return project(self.structure._changed(**parts), self.shapes, self.read, self.watched, self.covers, self.error)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return project, (self.structure, self.shapes, self.read, self.watched, self.covers, self.error)
@@ -134,9 +132,7 @@ def project(
         what: getattr(structure, what).projected(shapes) for what in ("mass", "damping", "stiffness")
     }
     loads = [
-        HarmonicLoad(
-            amplitude=c.amplitude.text, harmonic=c.harmonic, phase=c.phase.text, direction=seen(c.direction)
-        )
+        HarmonicLoad(amplitude=c.amplitude.text, harmonic=c.harmonic, phase=c.phase.text, direction=seen(c.direction))
         for c in structure.load_components()
         if np.any(c.direction)
     ]
@@ -181,9 +177,7 @@ def _seen_element(element: BaseElement, n: int, seen: _Seen) -> BaseElement:
     return result
 
 
-def coordinates_along(
-    shapes: Array, read: Array, matrices: tuple[Array, Array], watched: Sequence[int] = ()
-) -> Array:
+def coordinates_along(shapes: Array, read: Array, matrices: tuple[Array, Array], watched: Sequence[int] = ()) -> Array:
     """A basis (n, r) of the span of `shapes` in which the first coordinates are displacements along `read` (k, n).
 
     matrices: mass and stiffness in `shapes`, (r, r). The first coordinates deflect the structure as forces along
@@ -298,4 +292,3 @@ def coordinates_of(values: Any) -> Any:
 def lost_in_words(share: float) -> str:
     """What is said of a start that does not fit into a basis; nothing where all of it does."""
     return f"; {100.0 * share:.2g} % of the energy of the start do not fit into them" if share > _NOTICED else ""
-

@@ -23,12 +23,15 @@ from suboctave.model.elements.base import BaseElement
 from suboctave.model.elements.coupled import as_coupled
 from suboctave.model.elements.smoothness import switches
 from suboctave.model.expressions.coefficients import Coefficient
+from suboctave.model.projected import ProjectedSystem
 
 __all__ = ["Array", "Field", "Switch", "default_lengths", "scaled_field"]
 
 Array = NDArray[np.float64]
 RightHandSide = Callable[[float, Array], Array]
 
+#: degrees of freedom up to which everything is stepped
+FEW = 40
 # A degree of freedom that hardly moves is measured against this share of the largest motion (weighted by its mass).
 _SMALLEST_SHARE = 1e-3
 # The law of a stop takes this many units in the last place of `u` and `gap` for "exactly at the gap".
@@ -148,6 +151,7 @@ class Field:
         self._gap_stiffness = np.array([s.stiffness or 0.0 for s in self.switches])
         self._gap_size = size
         self._piecewise: dict[bytes, tuple[Array, Array]] = {}
+        self._spectra: dict[bytes, tuple[NDArray[np.complex128], ...]] = {}
 
     def at_frequency(self, omega: float) -> Field:
         """The same field, with the same scales and reference frequency, at another `omega`."""
@@ -167,10 +171,30 @@ class Field:
         return self._piecewise[key]
 
     def linear_rate(self, active: NDArray[np.bool_]) -> Array:
-        """What the scaled state is multiplied by in its rate per unit of `tau`, (2n, 2n); all of it without smooth
-        laws.
-        """
+        """What the scaled state is multiplied by in its rate per unit of `tau`, (2n, 2n), smooth laws left out."""
         return self._matrices(active)[0].T
+
+    def constant(self, active: NDArray[np.bool_]) -> Array:
+        """What does not change in the rate, (2n,)."""
+        return self._matrices(active)[1]
+
+    @property
+    def push(self) -> Array:
+        """Rates (m, 2n) by loads of the amplitude 1."""
+        return self._push
+
+    @property
+    def closed(self) -> bool:
+        """Whether the flow between contacts is taken in closed form: linear, and of too many modes to be stepped."""
+        return not self.smooth and self.n > FEW
+
+    def spectrum(self, active: NDArray[np.bool_]) -> tuple[NDArray[np.complex128], ...]:
+        """Eigenvalues (2n,) and vectors of `linear_rate`, and their inverse, (2n, 2n)."""
+        key = active.tobytes()
+        if key not in self._spectra:
+            values, vectors = np.linalg.eig(self.linear_rate(active).astype(complex))
+            self._spectra[key] = values, vectors, np.linalg.inv(vectors)
+        return self._spectra[key]
 
     def right_hand_side(self, active: NDArray[np.bool_], slope: bool = False) -> RightHandSide:
         """The rate of the stacked rows per unit of `tau`, contacts frozen as in `active` (one flag per switch)."""
@@ -244,7 +268,9 @@ def default_lengths(field: Field, motion: Array) -> Array:
     if largest == 0.0:  # nothing moves and nothing pushes: the gaps are the only lengths that there are
         gaps = [abs(s.gap) * float(weight @ np.abs(s.direction)) for s in field.switches if s.gap != 0.0]
         largest = max(gaps, default=1.0)
-    return np.maximum(size, _SMALLEST_SHARE * largest / weight)
+    # modes that hardly move matter by what they add to the motion of the structure
+    share = 1.0 if isinstance(field.system, ProjectedSystem) else _SMALLEST_SHARE
+    return np.maximum(size, share * largest / weight)
 
 
 def scaled_field(system: System, state: Array, omega: float, values: Mapping[str, float] | None = None) -> Field:

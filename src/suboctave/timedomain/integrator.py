@@ -4,7 +4,8 @@ DOP853 (Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, in S
 switch of the field changes sign. Those are found on the interpolant of a step, then reached by an integration of their
 own and refined by Newton, because an error `d` in the instant is one of order `stiffness d` in the tangent. A pair of
 crossings inside one step (a near-grazing contact) shows as an extremum of the distance and is looked for there.
-The force is continuous at a gap, so the state-transition matrix goes through without a jump.
+The force is continuous at a gap, so the state-transition matrix goes through without a jump. Piecewise-linear systems
+of many degrees of freedom are not stepped but solved between their contacts (`linear_flow`).
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from numpy.typing import NDArray
 from suboctave.errors import ConvergenceError
 from suboctave.interruption import check_time
 from suboctave.timedomain.field import Array, Field
+from suboctave.timedomain.linear_flow import ExactRate, ExactSolver, exact_rate
 
 if TYPE_CHECKING:
     from scipy.integrate import DOP853, DenseOutput
@@ -69,9 +71,11 @@ class Passage:
     stretches: list[tuple[float, NDArray[np.bool_]]] = field(default_factory=list)
 
 
-def _solver(rhs: Any, begin: float, y: Array, end: float, rtol: float, atol: float, first: float | None) -> DOP853:
+def _solver(rhs: Any, begin: float, y: Array, end: float, rtol: float, atol: float, first: float | None) -> Any:
     if first is not None:
         first = min(first, end - begin)
+    if isinstance(rhs, ExactRate):
+        return ExactSolver(rhs, begin, y, end, first)
     return scipy.integrate.DOP853(rhs, begin, y, end, rtol=rtol, atol=atol, first_step=first)
 
 
@@ -220,7 +224,7 @@ def advance(
     out = Passage(y, np.abs(y[:m]).copy(), tau=[begin], states=[y[:m].copy()])
     tau, length = begin, None
     while tau < end:
-        rhs = model.right_hand_side(watch.active, slope)
+        rhs = exact_rate(model, watch.active, slope)
         solver = _solver(rhs, tau, y, end, rtol, atol, length)
         while solver.status == "running":
             _step(solver, model)

@@ -16,12 +16,9 @@ from suboctave.errors import InputError
 from suboctave.model import System
 from suboctave.timedomain.field import Array, Field, scaled_field
 from suboctave.timedomain.integrator import Contact, Passage, advance, reach
+from suboctave.timedomain.linear_flow import exact_rate
 
 __all__ = ["Contact", "Trajectory", "integrate", "largest_displacement", "state_transition"]
-
-#: degrees of freedom beyond which the tangent flow of piecewise-linear systems is taken from matrix exponentials, which
-#: takes less than integrating as many columns
-_FEW = 40
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +133,7 @@ def flow(
 ) -> tuple[Array, Array, Passage]:
     """Scaled state at the end, scaled state-transition matrix (2n, 2n, or 2n + 1 columns with `slope`), the passage."""
     m = 2 * model.n
-    closed = not model.smooth and model.n > _FEW
+    closed = model.closed
     rows = np.vstack([z[None, :], np.eye(0 if closed else m, m)] + ([np.zeros((1, m))] if slope else []))
     passage = advance(model, begin, rows.ravel(), end, rtol, rtol, slope=slope)
     final = passage.y.reshape(-1, m)
@@ -177,7 +174,7 @@ def largest_displacement(model: Field, passage: Passage, dof: int) -> float:
 def _extreme(model: Field, passage: Passage, i: int, at: float, dof: int) -> float:
     """Scaled displacement at the zero of the velocity near `at`, inside step `i`, by Newton on exact integrations."""
     n, step = model.n, passage.steps[i]
-    rhs = model.right_hand_side(step.active)
+    rhs = exact_rate(model, step.active, False)
     z = step.start[: 2 * n]
     for _ in range(3):
         at = min(max(at, step.begin), step.end)

@@ -84,7 +84,7 @@ class Verification:
 
     distance
         Largest difference of the states at t = 0, relative to the motion (displacements by the largest displacement,
-        velocities by the largest velocity); for a bifurcation also the relative difference in omega, if larger; for a
+        velocities by the largest velocity; of a projected structure both in the norm of its mass); for a bifurcation also the relative difference in omega, if larger; for a
         grazing the distance by which the motion misses the gap, relative to the relative displacement, if larger.
     multiplier_error
         Largest difference between multipliers, paired.
@@ -134,17 +134,15 @@ def verify_motion(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: fl
     except ConvergenceError as failure:
         what_failed = "shooting found no motion from here" if kind is None else "shooting did not locate it"
         return Verification(math.inf, math.inf, None, False, None, f"{what_failed}: {failure}", projection)
-    sizes = np.repeat(_largest(motion), len(whole) // 2)
-    # a motion at rest differs from another only if that one moves
-    away = np.asarray(system.recovered(solution.state)) - whole
-    distance = float(np.max(np.abs(away) / np.maximum(sizes, np.finfo(float).tiny)))
-    distance = max(distance, abs(solution.omega - motion.omega) / motion.omega)
+    distance = _distance(system, motion, start, solution)
     if isinstance(what, Bifurcation) and touches:
         distance = max(distance, distance_from_gap(system, what, solution.state, solution.omega))
     error = pairing(floquet.multipliers, solution.multipliers)
 
     def verdict(agrees: bool, reason: str) -> Verification:
-        return Verification(distance, error, solution.stable, agrees, recovered_solution(system, solution), reason, projection)
+        return Verification(
+            distance, error, solution.stable, agrees, recovered_solution(system, solution), reason, projection
+        )
 
     if kind is not None:
         words = f"Shooting finds {KINDS[kind].words} at omega = {solution.omega:.9g}"
@@ -163,16 +161,38 @@ def verify_motion(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: fl
     return verdict(True, "The same motion" if isinstance(what, TrackedEvent) else "The same motion, the same verdict")
 
 
-def _largest(motion: PeriodicOrbit, system: System | None = None) -> tuple[float, float]:
-    """The largest displacement and the largest velocity of a motion, of any DOF, or of any coordinate of a system."""
-    n, largest = motion.balance.system.n, np.zeros(2)
+def _distance(system: System, motion: PeriodicOrbit, start: Array, solution: PeriodicSolution) -> float:
+    """Of a solution from the motion's state (2n,) at t = 0, relative; of their frequencies, if larger."""
+    away, sizes = _measured(system, solution.state - start), _largest(motion, system)
+    # a motion at rest differs from another only if that one moves
+    distance = max(float(a.max()) / max(size, np.finfo(float).tiny) for a, size in zip(away, sizes, strict=True))
+    return max(distance, abs(solution.omega - motion.omega) / motion.omega)
+
+
+def _largest(motion: PeriodicOrbit, system: System) -> tuple[float, float]:
+    """The largest displacement and the largest velocity of a motion as `_measured`."""
+    largest = np.zeros(2)
     instants = np.linspace(0.0, motion.period, 8 * motion.basis.harmonics + 8)
     # so many at once that they fit into memory
-    for t in np.array_split(instants, 1 + len(instants) * n // _AT_ONCE):
-        state = np.hstack([motion.displacement(t).T, motion.velocity(t).T])
-        state = state if system is None else system.reduced(state)
-        largest = np.maximum(largest, [np.abs(part).max() for part in np.split(state, 2, axis=1)])
+    for t in np.array_split(instants, 1 + len(instants) * motion.system.n // _AT_ONCE):
+        states = system.reduced(np.hstack([motion.displacement(t).T, motion.velocity(t).T]))
+        largest = np.maximum(largest, [part.max() for part in _measured(system, states)])
     return float(largest[0]), float(largest[1])
+
+
+def _measured(system: System, states: Array) -> tuple[Array, Array]:
+    """Sizes of displacements and of velocities, of states (..., 2n) of the system that is integrated.
+
+    Of every degree of freedom its modulus. Of a projected structure, which may have translations, rotations and
+    curvatures among its unknowns, the norm of the mass: the root of twice the kinetic energy, and the same of
+    displacements.
+    """
+    x, v = np.split(np.asarray(states), 2, axis=-1)
+    if not isinstance(system, ProjectedSystem):
+        return np.abs(x), np.abs(v)
+    mass = system.mass.value(system.parameters)
+    norms = (np.sqrt(np.einsum("...i,ij,...j->...", part, mass, part)) for part in (x, v))
+    return next(norms), next(norms)
 
 
 def distance_from_gap(system: System, what: Bifurcation, state: Array, omega: float) -> float:
@@ -217,9 +237,7 @@ def recovered_solution(system: System, solution: PeriodicSolution) -> PeriodicSo
     return replace(solution, state=system.recovered(solution.state)[:], dof=system.watched[solution.dof])
 
 
-def _by_shooting(
-    system: System, motion: PeriodicOrbit, kind: str, start: Array, tolerance: float
-) -> PeriodicSolution:
+def _by_shooting(system: System, motion: PeriodicOrbit, kind: str, start: Array, tolerance: float) -> PeriodicSolution:
     """The bifurcation located by shooting, or the motion at the same omega.
 
     The latter where the search loses the multiplier but the count of unstable ones changes as it should within a tenth
@@ -412,22 +430,37 @@ class Shot:
 class Shots:
     """Multiple shooting from motions of one curve, which have one period.
 
-    Distances are those of displacements and velocities of all degrees of freedom, or of the coordinates of a
-    projection, which are displacements as well.
+    Its differences take four trajectories for every coordinate and piece: projected structures, with dozens of
+    coordinates, are shot at once over the period, at the motion's frequency.
     """
 
     def __init__(self, orbits: Sequence[PeriodicOrbit], workers: int | None = None) -> None:
         self.system = integrated_system(orbits)
         self.shooting = MultipleShooting(self.system, orbits[0].basis.nu, workers)
+        self.projected = isinstance(self.system, ProjectedSystem)
 
     def motions(
         self, orbits: Sequence[PeriodicOrbit], kinds: Sequence[str] = (), reach: float | None = None
     ) -> Iterator[Shot]:
         """The true motions beside these; where bifurcations of these kinds lie within `reach` on either side."""
+        if self.projected:
+            yield from map(self._single, orbits)
+            return
         count = self.shooting.at_once
         for begin in range(0, len(orbits), count):
             end = begin + count
             yield from self._batch(orbits[begin:end], kinds[begin:end], reach)
+
+    def _single(self, orbit: PeriodicOrbit) -> Shot:
+        start = self.system.reduced(orbit.start())
+        try:
+            found = shoot(self.system, start, orbit.omega, orbit.basis.nu, orbit.values)
+        except ConvergenceError:
+            none = np.zeros(0, dtype=complex)
+            return Shot(False, math.inf, start, orbit.omega, none, none.real, math.nan, math.nan)
+        distance = _distance(self.system, orbit, start, found)
+        doubt = np.full(len(found.multipliers), found.residual)
+        return Shot(True, distance, found.state, found.omega, found.multipliers, doubt, math.nan, found.omega)
 
     def _batch(self, orbits: Sequence[PeriodicOrbit], kinds: Sequence[str], reach: float | None) -> list[Shot]:
         states, omega, parameters, sizes = self._starts(orbits)
