@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import scipy.linalg
+import scipy.sparse
 
 import suboctave as so
 from suboctave.study.file import read_study
@@ -39,3 +40,14 @@ def test_matrices_from_files(tmp_path, monkeypatch, capsys):
     for ours, theirs in zip(read.matrices(), scope["system"].matrices(), strict=True):
         np.testing.assert_array_equal(ours, theirs)
     assert isinstance(scope["frame"], so.Structure)
+
+
+def test_in_time(capsys):
+    """The last part of the page."""
+    section = PAGE.split("## In time")[1]
+    (code,), (printed,) = (re.findall(rf"^```{kind}\n(.*?)^```", section, re.M | re.S) for kind in ("python", "text"))
+    exec(compile(code, "docs/structures.md", "exec"), {"np": np, "so": so, "scipy": scipy})
+    shown = capsys.readouterr().out.splitlines()
+    assert len(shown) == len(printed.splitlines())
+    numbers = [[float(one) for one in re.findall(r"\d+\.?\d*", text.split("error")[0])] for text in (shown[0], printed)]
+    np.testing.assert_allclose(numbers[0], numbers[1][: len(numbers[0])], rtol=1e-5)

@@ -246,6 +246,10 @@ def basins(
     taken in 192 points of it, and the radius that passes is reduced by a tenth: no proof, so that up to 200 of the
     stopped trajectories are followed to the end (`followed`, `contradicted`). A motion about which nothing contracts
     has no such neighbourhood; its trajectories are followed for all `periods`.
+
+    On a plane of a large structure, displacement and velocity of the observed degree of freedom or two that `plane`
+    names, the others follow as a force there deflects them. Its neighbourhoods are a hundredth of the motion and not
+    examined: what was followed to the end says how far to trust them.
     """
     state, values = start_state(system, rest), system.read_values(parameters)
     check_omega(omega)

@@ -70,8 +70,8 @@ class TimeOptions(RunOptions, total=False):
     linear: Annotated[
         Any,
         "The linear part whose projection a structure of more than 40 degrees of freedom is integrated in, as "
-        "`condense` gives it (default: for 15 harmonics of the highest omega); `StructuralMatrices(system)` for all of "
-        "its degrees of freedom.",
+        "`condense` gives it (default: for 15 harmonics of the highest omega); `harmonic.StructuralMatrices(system)` "
+        "for all of its degrees of freedom.",
     ]
 
 

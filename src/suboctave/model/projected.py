@@ -196,8 +196,8 @@ def coordinates_along(shapes: Array, read: Array, matrices: tuple[Array, Array],
     size = np.sqrt(flexibility.diagonal())
     if not np.linalg.eigvalsh(flexibility / np.multiply.outer(size, size))[0] > _DEPENDENT**2:
         raise InputError(
-            "the observed degrees of freedom and those that forces act on do not move by themselves in the modes of the "
-            "projection: observe fewer of them"
+            "the observed degrees of freedom and those that forces act on do not move by themselves in the modes of "
+            "the projection: observe fewer of them"
         )
     static = (weight[:, None] * along.T) @ np.linalg.inv(flexibility)
     null = np.linalg.qr(along.T, mode="complete")[0][:, count:]

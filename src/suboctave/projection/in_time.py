@@ -1,10 +1,10 @@
 """The system that is integrated in the place of a large structure.
 
 What harmonic balance does with a structure is done here too: up to `reduction.COMPLETE` degrees of freedom, and where
-forces act along all of them, it is taken as it is; beyond, it is projected onto the basis that `reduction` grows for the
-directions of its elements and loads and for the observed degrees of freedom. A motion in time has no highest harmonic:
-the basis is made for `HARMONICS` of them, as that of `condense`, and what lies above is known as well as the basis
-happens to have it.
+forces act along all of them, it is taken as it is; beyond, it is projected onto the basis that `reduction` grows for
+the directions of its elements and loads and for the observed degrees of freedom. A motion in time has no highest
+harmonic: the basis is made for `HARMONICS` of them, as that of `condense`, and what lies above is known as well as the
+basis happens to have it.
 """
 
 from __future__ import annotations

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from suboctave.model.elements.base import Array
+from suboctave.model.projected import ProjectedSystem
 from suboctave.timedomain.adaptive_control import SCALARS, VECTORS
 from suboctave.timedomain.batch import ROOM, Group, Method
 from suboctave.timedomain.generated import Index, Rows, module_of
@@ -118,7 +119,9 @@ class AdaptiveMethod(Method):
         rows("y")[:], sizes = batch.states[members].T, batch.sizes[members].T
         weight, period = rows("weight"), rows("period")[0]
         rows("past")[:] = sizes
-        rows("floor")[:] = np.maximum(1e-3 * np.max(sizes * weight, axis=0) / weight, 1e-300)
+        # modes of a projection matter by what they add to the motion of the structure
+        share = 1.0 if isinstance(self.layout.system, ProjectedSystem) else 1e-3
+        rows("floor")[:] = np.maximum(share * np.max(sizes * weight, axis=0) / weight, 1e-300)
         rows("h")[:] = rows("next")[:] = np.minimum(_FIRST_STEP, 1.0 / self.samples) * period
         rows("left")[:, :alive] = batch.total
         rows("h")[:, alive:] = 0.0

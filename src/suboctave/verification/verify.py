@@ -84,8 +84,9 @@ class Verification:
 
     distance
         Largest difference of the states at t = 0, relative to the motion (displacements by the largest displacement,
-        velocities by the largest velocity; of a projected structure both in the norm of its mass); for a bifurcation also the relative difference in omega, if larger; for a
-        grazing the distance by which the motion misses the gap, relative to the relative displacement, if larger.
+        velocities by the largest velocity; of a projected structure both in the norm of its mass); for a bifurcation
+        also the relative difference in omega, if larger; for a grazing the distance by which the motion misses the gap,
+        relative to the relative displacement, if larger.
     multiplier_error
         Largest difference between multipliers, paired.
     stable

@@ -1,0 +1,105 @@
+"""Shooting from motions of projected structures."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.sparse
+
+import suboctave as so
+from suboctave.timedomain import field, integrate
+from suboctave.timedomain.field import scaled_field
+from suboctave.timedomain.trajectory import flow
+from suboctave.verification.verify import integrated_system
+
+N = 120
+TIP = N - 1
+
+
+def chain(elements):
+    """Equal masses, the first held, the last with an element and the load; the first frequency is 1."""
+    stiffness = scipy.sparse.diags_array([-np.ones(N - 1), np.full(N, 2.0), -np.ones(N - 1)], offsets=[-1, 0, 1])
+    stiffness = stiffness.tolil()
+    stiffness[TIP, TIP] = 1.0
+    angle = 0.5 * np.pi / (N + 0.5)
+    tip = np.sin(angle * N) ** 2 / np.sum(np.sin(angle * np.arange(1, N + 1)) ** 2)
+    stiffness = tip * stiffness.tocsr() / (2.0 * np.sin(0.5 * angle)) ** 2
+    mass = tip * scipy.sparse.eye_array(N).tocsr()
+    return so.System(mass, 0.02 * mass + 0.02 * stiffness, stiffness, elements, [so.HarmonicLoad(TIP, 0.05)])
+
+
+@pytest.fixture(scope="module")
+def stop():
+    return so.frequency_response(chain([so.ElasticStop(TIP, 1.0, 0.5)]), (1.2, 1.0), harmonics=25)
+
+
+@pytest.fixture(scope="module")
+def spring():
+    return so.frequency_response(chain([so.CubicSpring(TIP, 0.3)]), (1.2, 1.0), harmonics=9)
+
+
+def test_motions_agree(stop):
+    """With contacts: in closed form between them."""
+    touching = [p for p in stop.points if p.orbit.amplitude(TIP) > 0.6]
+    for point in (touching[0], touching[len(touching) // 2]):
+        check = so.verify(point)
+        assert check.agrees
+        assert check.multiplier_error < 1e-4
+        assert check.projection.n < N
+        assert check.solution.state.shape == (2 * N,)
+        assert check.solution.amplitude == pytest.approx(point.orbit.amplitude(TIP), rel=1e-4)
+        assert "120 degrees of freedom in" in repr(check)
+
+
+def test_a_smooth_law_is_stepped(spring):
+    check = so.verify(max(spring.points, key=lambda p: p.orbit.amplitude(TIP)))
+    assert check.agrees
+    assert check.distance < 1e-5
+    assert check.multiplier_error < 1e-5
+
+
+def test_bifurcations_are_located_again(stop):
+    assert len(stop.bifurcations)
+    for item in stop.bifurcations:
+        check = so.verify(item)
+        assert check.agrees, check
+
+
+def test_a_branch(stop, tmp_path):
+    check = so.verify(stop, points=3, bifurcations=False)
+    assert check.agrees
+    assert check.basis.startswith("Projected: 120 degrees of freedom")
+    again = so.load(check.save(tmp_path / "check.nc"))
+    assert repr(again) == repr(check)
+
+
+def test_the_closed_form_is_what_stepping_gives(stop, monkeypatch):
+    """State, tangent flow, slope by omega and contact instants."""
+    orbit = max(stop.orbits, key=lambda o: o.amplitude(TIP))
+    small = integrated_system([orbit])
+    start, found = small.reduced(orbit.start()), []
+    for few in (1, 1000):
+        monkeypatch.setattr(field, "FEW", few)
+        model = scaled_field(small, start, orbit.omega)
+        assert model.closed == (few == 1)
+        found.append(flow(model, 0.0, start / model.scale, 2.0 * np.pi, 1e-12, slope=True))
+    (one, slopes, passage), (other, stepped, whole) = found
+    np.testing.assert_allclose(one, other, atol=1e-9)
+    np.testing.assert_allclose(slopes, stepped, atol=1e-8 * np.abs(stepped).max())
+    assert len(passage.contacts) == len(whole.contacts) == 2
+    for contact, seen in zip(passage.contacts, whole.contacts, strict=True):
+        assert contact.time == pytest.approx(seen.time, abs=1e-9)
+
+
+def test_a_body_that_nothing_holds_between_its_contacts(monkeypatch):
+    """Two equal eigenvalues of rigid-body motion: there is no diagonal form, and the flow is stepped."""
+    stiffness = np.array([[1.0, -1.0], [-1.0, 1.0]])
+    loads = [so.HarmonicLoad(1, 0.1, static=0.1)]
+    free = so.System(np.eye(2), 0.1 * stiffness, stiffness, [so.ElasticStop(0, 3.0, 0.1)], loads)
+    start, ends = np.array([0.0, 0.0, 0.1, 0.2]), []
+    for few in (1, 1000):
+        monkeypatch.setattr(field, "FEW", few)
+        path = integrate(free, start, (0.0, 20.0), 2.0)
+        assert len(path.contacts) > 2
+        ends.append(path.end)
+    np.testing.assert_allclose(ends[0], ends[1], atol=1e-8)
