@@ -139,13 +139,15 @@ def test_what_does_not_fit_into_the_basis_is_told(spring):
 def results(spring):
     """Of each experiment a short one."""
     options = {"transient": 20, "periods": 6}
+    tapped = {"steps": 1, "settle": 30, "measure": 6, "harmonics": (1, 3), "tap": (1.0, 9, 0.1)}
+    points = {"parameter": "k", "values": (0.2, 0.3), "counts": (1, 1), "transient": 5, "periods": 16}
     return {
         "trajectory": so.integrate(spring, omega=1.0, periods=2),
         "sections": so.poincare_sections(spring, np.zeros((2, 2 * N)), omega=1.0, observe=20, **options),
         "brute": so.brute_force_diagram(spring, (1.0, 1.01), count=2, **options),
-        "sine": so.stepped_sine(spring, (1.0, 1.01), steps=1, settle=30, measure=6, harmonics=(1, 3), tap=(1.0, 9, 0.1)),
+        "sine": so.stepped_sine(spring, (1.0, 1.01), **tapped),
         "lyapunov": so.lyapunov_exponents(spring, omega=1.0, periods=32, transient=10, count=1, trajectories=2),
-        "map": so.lyapunov_map(spring, (1.0, 1.01), parameter="k", values=(0.2, 0.3), counts=(1, 1), transient=5, periods=16),
+        "map": so.lyapunov_map(spring, (1.0, 1.01), **points),
     }  # fmt: skip
 
 

@@ -7,10 +7,10 @@ import pytest
 import scipy.sparse
 
 import suboctave as so
+from suboctave.projection import system_of_motions
 from suboctave.timedomain import field, integrate
 from suboctave.timedomain.field import scaled_field
 from suboctave.timedomain.trajectory import flow
-from suboctave.verification.verify import integrated_system
 
 N = 120
 TIP = N - 1
@@ -76,7 +76,7 @@ def test_a_branch(stop, tmp_path):
 def test_the_closed_form_is_what_stepping_gives(stop, monkeypatch):
     """State, tangent flow, slope by omega and contact instants."""
     orbit = max(stop.orbits, key=lambda o: o.amplitude(TIP))
-    small = integrated_system([orbit])
+    small = system_of_motions([orbit])
     start, found = small.reduced(orbit.start()), []
     for few in (1, 1000):
         monkeypatch.setattr(field, "FEW", few)

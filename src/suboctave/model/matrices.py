@@ -53,8 +53,8 @@ class MatrixCoefficient:
             if self.n > _MOST_DENSE:
                 raise InputError(
                     f"{self.what} as a dense array of {self.n} degrees of freedom takes {8e-9 * self.n**2:.0f} GB: a "
-                    "system of which forces act on few degrees of freedom is projected by itself, one of which they act "
-                    "on all cannot be this large"
+                    "system where forces act on few degrees of freedom is projected by itself, one where they act on "
+                    "all cannot be this large"
                 )
             return np.asarray(self.sparse_value(values).toarray(), dtype=float)
         result: Array = self._base.copy()

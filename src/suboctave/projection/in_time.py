@@ -17,6 +17,7 @@ import numpy as np
 from suboctave.harmonic.basis import Array
 from suboctave.harmonic.condensed import Condensed, acting, independent, linear_part_of
 from suboctave.harmonic.linear_part import LinearPart
+from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.reduction import COMPLETE
 from suboctave.model.projected import coordinates_along, project
 from suboctave.model.system import System
@@ -48,6 +49,22 @@ def small_system(
         # the basis grows by what it needs there, and keeps what it has
         linear = linear.rebuilt({**system.parameters, **dict(zip(names, values, strict=True))})
     return in_basis(system, linear, watched)
+
+
+def system_of_motions(motions: Sequence[PeriodicOrbit]) -> System:
+    """What shooting integrates: the system of motions of one curve, at the first one's parameters, or its projection.
+
+    That is the basis which the motions were solved in: shooting holds their harmonics against the same equation of
+    motion, and how far that is from the whole structure is what the error of the projection says.
+    """
+    first = motions[0]
+    if first.system.n <= COMPLETE:
+        return first.system
+    linear = first.state().linear
+    for motion in motions[1:]:
+        # a basis grows along a curve: the last one serves all of it
+        linear = linear.rebuilt(motion.values).covering(motion.omega * float(motion.basis.multiples[-1]))
+    return in_basis(first.system, linear, [first.system.observed_dof])
 
 
 def in_basis(system: System, linear: LinearPart, watched: Sequence[int]) -> System:

@@ -27,14 +27,13 @@ from suboctave.floquet.methods import StabilityMethod, method_of
 from suboctave.floquet.result import FloquetResult
 from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.orbit import PeriodicOrbit
-from suboctave.harmonic.reduction import COMPLETE
 from suboctave.interruption import Interruption, limited
 from suboctave.kinds import KINDS
 from suboctave.model.elements.coupled import reads
 from suboctave.model.projected import ProjectedSystem
 from suboctave.model.system import System
 from suboctave.progress import reporting
-from suboctave.projection import in_basis
+from suboctave.projection import system_of_motions
 from suboctave.results.branch import Branch, TrackedBranch
 from suboctave.timedomain import PeriodicSolution, integrate, locate_by_shooting, shoot
 from suboctave.timedomain.multiple_shooting import MultipleShooting, ShotMotions
@@ -120,7 +119,7 @@ class Verification:
 def verify_motion(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: float) -> Verification:
     """A motion against shooting, a bifurcation against its location by shooting (`verification.verify`)."""
     motion = _orbit(what)
-    system = integrated_system([motion])
+    system = system_of_motions([motion])
     floquet = what.floquet if isinstance(what, BranchPoint | Bifurcation) else stability(motion)
     whole = motion.start()
     start = system.reduced(whole)
@@ -213,22 +212,6 @@ def distance_from_gap(system: System, what: Bifurcation, state: Array, omega: fl
         centre, window = centre + at * window, 0.1 * window
     size = float(np.abs(path.at(np.linspace(0.0, period, 200))[0] @ direction).max())
     return abs(value - contact.gap) / size
-
-
-def integrated_system(motions: Sequence[PeriodicOrbit]) -> System:
-    """What shooting integrates: the system of motions of one curve, at the first one's parameters, or its projection.
-
-    That is the basis which the motions were solved in: shooting holds their harmonics against the same equation of
-    motion, and how far that is from the whole structure is what the error of the projection says.
-    """
-    first = motions[0]
-    if first.system.n <= COMPLETE:
-        return first.system
-    linear = first.state().linear
-    for motion in motions[1:]:
-        # a basis grows along a curve: the last one serves all of it
-        linear = linear.rebuilt(motion.values).covering(motion.omega * float(motion.basis.multiples[-1]))
-    return in_basis(first.system, linear, [first.system.observed_dof])
 
 
 def recovered_solution(system: System, solution: PeriodicSolution) -> PeriodicSolution:
@@ -436,7 +419,7 @@ class Shots:
     """
 
     def __init__(self, orbits: Sequence[PeriodicOrbit], workers: int | None = None) -> None:
-        self.system = integrated_system(orbits)
+        self.system = system_of_motions(orbits)
         self.shooting = MultipleShooting(self.system, orbits[0].basis.nu, workers)
         self.projected = isinstance(self.system, ProjectedSystem)
 
