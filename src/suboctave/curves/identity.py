@@ -196,7 +196,8 @@ def _written(orbit: PeriodicOrbit, nu: int, top: int, scales: Array) -> ComplexA
     kept = top // stride + 1
     c = np.zeros((top + 1, orbit.x.shape[1]), dtype=complex)
     c[: stride * (kept - 1) + 1 : stride] = to_complex(orbit.x)[:kept]
-    return c * scales
+    c *= scales
+    return c
 
 
 def _together(one: PeriodicOrbit, other: PeriodicOrbit) -> tuple[int, ComplexArray, ComplexArray, float]:
