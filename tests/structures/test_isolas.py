@@ -92,11 +92,28 @@ def test_the_same_birth_with_all_modes_of_a_beam(monkeypatch):
     assert event.omega == pytest.approx(isola.born.omega, rel=1e-6)
 
 
-def test_a_limit_point_lies_on_its_curve_whatever_the_basis():
-    """Bases grow with the harmonics of motions, and what is compared must not depend on them."""
-    response = so.frequency_response(beam(40), (1.8, 2.6))
-    item = response.bifurcations["PD"][0]
-    curve = so.track(item, "j", (0.1, 0.3), max_step=0.3)
-    sizes = {len(orbit.balance.linear.equation_of_motion()[0]) for orbit in (item.orbit, *curve.orbits)}
+def test_a_doubling_lies_on_its_curve_whatever_the_basis():
+    """Motions in two bases of different size are compared in one unit."""
+    system = beam(40)
+    item = so.frequency_response(system, (1.8, 2.6)).bifurcations["PD"][0]
+    wide = so.condense(system, 2.6, harmonics=150)
+    other = so.frequency_response(system, (1.8, 2.6), linear=wide).bifurcations["PD"][0]
+    curve = so.track(other, "j", (0.1, 0.3), max_step=0.3)
+    modes = [len(orbit.balance.linear.equation_of_motion()[0]) for orbit in (item.orbit, curve.orbits[0])]
+    assert modes[0] < modes[1]
     assert gap_to(item.orbit, curve.points, "j") is not None
-    assert len(sizes) > 1
+
+
+def test_one_basis_serves_all_responses():
+    """What a system at another gap, or a further curve, asks for has been made; nobody's basis changes under him."""
+    system = beam(40)
+    one, again, other = (
+        so.condense(system.with_parameters(j=j), 2.6, harmonics) for j, harmonics in ((0.2, 15), (0.4, 15), (0.2, 30))
+    )
+    assert again.reduction is one.reduction
+    assert other.reduction is not one.reduction
+    before = one.equation_of_motion()[0].copy()
+    wider = one.covering(2.0 * one.covers)
+    assert again.covering(1.9 * one.covers).reduction is wider.reduction
+    np.testing.assert_array_equal(one.equation_of_motion()[0], before)
+    assert one.rebuilt(system.parameters).reduction is one.reduction

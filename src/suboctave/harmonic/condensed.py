@@ -29,7 +29,7 @@ from suboctave.compiled import kernel
 from suboctave.errors import ConvergenceError, InputError, shortened
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices, in_words, natural_frequencies
-from suboctave.harmonic.reduction import Projected, Reduction
+from suboctave.harmonic.reduction import Reduction
 from suboctave.lazy import lazy
 from suboctave.model.inputs import check_count, check_is_system, observed_dof
 from suboctave.model.matrices import MatrixCoefficient
@@ -136,18 +136,18 @@ class Condensed:
     there, relative.
     """
 
-    def __init__(self, reduction: Reduction, projected: Projected, values: Mapping[str, float]) -> None:
-        self.reduction, self.projected, self.values = reduction, projected, dict(values)
+    def __init__(self, reduction: Reduction, values: Mapping[str, float]) -> None:
+        self.reduction, self.projected, self.values = reduction, reduction.projected, dict(values)
         self.system = reduction.system
         self.size = len(reduction.directions)
-        self.covers, self.error = projected.covers, projected.error
+        self.covers, self.error = self.projected.covers, self.projected.error
         #: the part at the last other values, and one that covers more
         self._other: Condensed | None = None
         self._wider: Condensed | None = None
         #: what was asked for last, by frequencies
         self._last: tuple[Array, tuple[Blocks, ComplexArray, ComplexArray]] | None = None
         #: M, C, K, (3, r, r)
-        self._matrices = np.array([matrix.value(values) for matrix in projected.matrices])
+        self._matrices = np.array([matrix.value(values) for matrix in self.projected.matrices])
 
     @property
     def made_for(self) -> dict[str, Any] | None:
@@ -173,7 +173,7 @@ class Condensed:
     def rebuilt(self, values: Mapping[str, float]) -> Condensed:
         """The same part at other parameter values."""
         if self._other is None or self._other.values != values:
-            self._other = Condensed(self.reduction, self.reduction.covering(self.covers, values), values)
+            self._other = Condensed(self.reduction.covering(self.covers, values), values)
         return self._other
 
     def covering(self, frequency: float) -> Condensed:
@@ -185,8 +185,11 @@ class Condensed:
                 f"a frequency of {frequency:.3g} is far beyond {self.covers:.3g}, which the structure is projected for"
             )
         if self._wider is None or self._wider.covers < frequency:
-            projected = self.reduction.covering(_BEYOND * frequency, self.values)
-            self._wider = Condensed(self.reduction, projected, self.values)
+            # in steps that are the same for all motions
+            wide = self.covers
+            while wide < frequency:
+                wide *= _BEYOND
+            self._wider = Condensed(self.reduction.covering(wide, self.values), self.values)
         return self._wider
 
     # -------------------------------------------------------------------------------------------------- coordinates
@@ -361,8 +364,8 @@ def linear_part_of(
         return StructuralMatrices(system, at)
     units = [np.eye(1, system.n, dof)[0] for dof in observed]
     served = independent([*directions, *units])
-    reduction = Reduction(system, directions, served, tuple(observed), frequency / 16.0 if scale is None else scale)
-    return Condensed(reduction, reduction.covering(frequency, at), at)
+    unit = frequency / 16.0 if scale is None else scale
+    return Condensed(Reduction.of(system, directions, served, tuple(observed), unit, frequency, at), at)
 
 
 def condense(

@@ -16,8 +16,10 @@ all of it; the shift makes it one of a definite matrix for free bodies too. In e
 
 from __future__ import annotations
 
+import copy
 import math
-from collections.abc import Mapping
+import weakref
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -74,11 +76,14 @@ class Projected(NamedTuple):
 
 
 class Reduction:
-    """Grows the basis of a structure for the directions (m, n) that forces act along.
+    """A structure in a basis that is grown for the directions (m, n) that forces act along; larger ones grow from it.
 
     served: these and others that the motion is read along, (k, n), such as those of the degrees of freedom `observed`;
-    scale: a frequency within the range of interest.
+    scale: a frequency within the range of interest; projected: the structure in the basis. Made by `of` and `covering`:
+    what one curve asks for does not change what others have, and what several ask for is made once.
     """
+
+    projected: Projected
 
     def __init__(
         self, system: System, directions: Array, served: Array, observed: tuple[int, ...], scale: float
@@ -93,26 +98,51 @@ class Reduction:
         self._solve: Any = None
         #: expressions in the matrices and the highest frequency, where the basis was tested
         self._tested: list[tuple[Array, float]] = []
-        self._projected: Projected | None = None
+        #: what has grown from it and is in use, by what it was grown for
+        self._larger: weakref.WeakValueDictionary[tuple[Any, ...], Reduction] = weakref.WeakValueDictionary()
 
-    def covering(self, frequency: float, values: Mapping[str, float]) -> Projected:
-        """The structure in a basis that serves up to a frequency at these values of the parameters."""
-        if self.system.n <= COMPLETE:
-            if self._projected is None:
-                self._projected = Projected(self._matrices, None, self.directions, math.inf, 0.0)
-            return self._projected
-        at = np.array([c.value(values) for matrix in self._matrices for c in matrix.coefficients])
-        near = [
-            covers
+    @classmethod
+    def of(
+        cls,
+        system: System,
+        directions: Array,
+        served: Array,
+        observed: tuple[int, ...],
+        scale: float,
+        frequency: float,
+        values: Mapping[str, float],
+    ) -> Reduction:
+        """The smallest basis that serves up to a frequency at these values of the parameters."""
+        made = cls(system, directions, served, observed, scale)
+        if system.n <= COMPLETE:
+            made.projected = Projected(made._matrices, None, directions, math.inf, 0.0)
+            return made
+        at = made._expressions(values)
+        key = (*map(id, made._matrices), *(a.tobytes() for a in (directions, served, at)), observed, scale, frequency)
+        return _kept(_IN_USE, key, lambda: made._grown_to(frequency, values, at))
+
+    def _expressions(self, values: Mapping[str, float]) -> Array:
+        return np.array([c.value(values) for matrix in self._matrices for c in matrix.coefficients])
+
+    def covering(self, frequency: float, values: Mapping[str, float]) -> Reduction:
+        """This one, or one that serves up to a frequency at these values of the parameters."""
+        if self.projected.shapes is None:
+            return self
+        at = self._expressions(values)
+        if any(
+            np.all(np.abs(at - tested) <= _TRUSTED * np.abs(tested)) and covers >= frequency
             for tested, covers in self._tested
-            if np.all(np.abs(at - tested) <= _TRUSTED * np.abs(tested)) and covers >= frequency
-        ]
-        if near and self._projected is not None:
-            return self._projected
-        self._grown(frequency, values)
-        self._tested.append((at, frequency))
-        self._projected = self._project(values)
-        return self._projected
+        ):
+            return self
+        return _kept(self._larger, (frequency, at.tobytes()), lambda: self._grown_to(frequency, values, at))
+
+    def _grown_to(self, frequency: float, values: Mapping[str, float], at: Array) -> Reduction:
+        larger = copy.copy(self)
+        larger._larger = weakref.WeakValueDictionary()
+        larger._grown(frequency, values)
+        larger._tested = [*self._tested, (at, frequency)]
+        larger.projected = larger._project(values)
+        return larger
 
     # ---------------------------------------------------------------------------------------------------- the basis
     def _grown(self, top: float, values: Mapping[str, float]) -> None:
@@ -200,6 +230,22 @@ class Reduction:
                 f"{shapes.shape[1]} vectors: keep fewer harmonics, or damp the structure more"
             )
         return Projected(matrices, shapes, seen, top, error)
+
+
+#: reductions in use
+_IN_USE: weakref.WeakValueDictionary[tuple[Any, ...], Reduction] = weakref.WeakValueDictionary()
+
+
+def _kept(
+    known: weakref.WeakValueDictionary[tuple[Any, ...], Reduction],
+    key: tuple[Any, ...],
+    make: Callable[[], Reduction],
+) -> Reduction:
+    """What is known by that key, or made now."""
+    found = known.get(key)
+    if found is None:
+        found = known[key] = make()
+    return found
 
 
 def _flexibilities(small: list[Array], seen: Array, top: float) -> ComplexArray:
