@@ -443,6 +443,8 @@ _LADDER = ((0.5, 1.0, 1.5, 2.0, 3.0), (0.5, 1.0, 1.5, 2.0))
 _ACCURACY = 1e-4
 #: share of parts that cancel by which they are taken not to
 _CANCELLED_PROJECTED = 0.02
+#: what each law does: direction to the left, to the right, Galerkin matrix
+_Parts = list[tuple[Array, Array, Array]]
 
 
 def transition(system: Variational, harmonics: int, subharmonic: bool) -> Array:
@@ -491,7 +493,7 @@ def _propagated(system: Variational, doubled: np.ndarray, kept: int) -> Array:
     return _by_taylor(start, block, parts, cosine, frequency, steps)
 
 
-def _taylor_steps(block: Array, parts: list[tuple[Array, Array, Array]], highest: float) -> int:
+def _taylor_steps(block: Array, parts: _Parts, highest: float) -> int:
     """Steps for a period, by the time scale of Hill's matrix: its norm, were velocities measured in the highest
     frequency.
     """
@@ -510,14 +512,7 @@ def _projected(spectrum: np.ndarray, doubled: np.ndarray, kept: int) -> Array:
     return galerkin(padded, None, 0.0, bool(doubled[0] == 0), len(doubled))
 
 
-def _by_taylor(
-    start: Array,
-    block: Array,
-    parts: list[tuple[Array, Array, Array]],
-    cosine: np.ndarray,
-    frequency: Array,
-    steps: int,
-) -> Array:
+def _by_taylor(start: Array, block: Array, parts: _Parts, cosine: np.ndarray, frequency: Array, steps: int) -> Array:
     """`exp(2 pi H)` on `start` by Taylor series of short steps: H is known by its action only."""
     n, size, columns = block.shape[0] // 2, len(start), start.shape[2]
     turn = frequency[:, None]
