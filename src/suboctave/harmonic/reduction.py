@@ -149,11 +149,11 @@ class Reduction:
         """Grow the basis until it serves."""
         matrices = [matrix.sparse_value(values) for matrix in self._matrices]
         if self._solve is None:
-            self._solve = factorised(matrices[2] + self.scale**2 * matrices[0])
+            self._solve = factorised(matrices[2] + self.scale**2 * matrices[0]).solve
         images = [matrix @ self._shapes for matrix in matrices]
         columns = self.served.T
         if not self._shapes.shape[1]:
-            self._add(self._solve(columns), matrices, images)
+            self._add(self._solve(np.ascontiguousarray(columns)), matrices, images)
         best, since = math.inf, 0
         order, known = list(range(len(_TESTED))), np.zeros((1, 1, 1), dtype=complex)
         while True:
@@ -265,24 +265,20 @@ def _change(one: ComplexArray, other: ComplexArray) -> float:
 
 
 def factorised(matrix: Any) -> Any:
-    """The solver of a large sparse matrix."""
+    """SuperLU's factors of a large sparse matrix."""
     try:
-        factors = sparse_factors(matrix)
+        return sparse_factors(matrix)
     except RuntimeError as failure:
         raise InputError(f"the stiffness cannot be factorised ({failure}): is a part of the structure empty?") from None
-
-    def solve(columns: Array) -> Array:
-        result: Array = factors.solve(np.ascontiguousarray(columns))
-        # without pivots off the diagonal digits may be lost: once more for what is left over
-        result += factors.solve(columns - matrix @ result)
-        return result
-
-    return solve
 
 
 def exact_flexibility(system: System, directions: Array, frequency: float, values: Mapping[str, float]) -> ComplexArray:
     """The dynamic flexibility between directions (m, n) by a direct solution of the whole structure, (m, m)."""
     mass, damping, stiffness = (m.sparse_value(values) for m in (system.mass, system.damping, system.stiffness))
-    columns = factorised(stiffness - frequency**2 * mass + 1j * frequency * damping)(directions.T.astype(complex))
-    result: ComplexArray = directions @ columns
+    matrix = stiffness - frequency**2 * mass + 1j * frequency * damping
+    factors, columns = factorised(matrix), np.ascontiguousarray(directions.T.astype(complex))
+    answers = factors.solve(columns)
+    # without pivots off the diagonal digits may be lost: once more for what is left over
+    answers += factors.solve(columns - matrix @ answers)
+    result: ComplexArray = directions @ answers
     return result
