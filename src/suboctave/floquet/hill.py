@@ -494,9 +494,7 @@ def _propagated(system: Variational, doubled: np.ndarray, kept: int) -> Array:
 
 
 def _taylor_steps(block: Array, parts: _Parts, highest: float) -> int:
-    """Steps for a period, by the time scale of Hill's matrix: its norm, were velocities measured in the highest
-    frequency.
-    """
+    """Steps for a period, by the norm of Hill's matrix, were velocities measured in the highest frequency."""
     n = block.shape[0] // 2
     stiff = float(np.abs(block[n:, :n]).sum(axis=1).max())
     stiff += sum(float(np.abs(p).sum(axis=1).max() * np.abs(l).max() * np.abs(r[:n]).sum()) for l, r, p in parts)
