@@ -166,3 +166,20 @@ def test_a_missing_package_is_named(cantilever, monkeypatch, tmp_path, package, 
     given = (cantilever, {"one": np.zeros(cantilever.n)})
     with pytest.raises(so.InputError, match=r"pip install suboctave\[fe\]"):
         so.write_vtu(tmp_path / "a.vtu", *given) if call == "write_vtu" else so.to_pyvista(*given)
+
+
+def test_motions_are_taken_as_they_are(tmp_path):
+    """An orbit, or what has one: instants of its period, and the largest displacements."""
+    structure = so.structures.beam(0.7, 0.014, 0.014, 2.05e11, 7800.0, 4)
+    tip = structure.dof(4, "z")
+    system = structure.system([so.CubicSpring(tip, 1e9)], [so.HarmonicLoad(tip, 0.3)], damping=so.Rayleigh(3.0, 0.0))
+    branch = so.frequency_response(system, (100.0, 101.0), harmonics=3)
+    orbit = branch.points[0].orbit
+    instants = orbit.displacement(np.arange(48) / 48 * orbit.period).T
+    largest = instants[np.linalg.norm(instants, axis=1).argmax()]
+    for name, given in (("a", branch.points[0]), ("b", largest)):
+        so.plot_shape(structure, given, tmp_path / f"{name}.png")
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+    for name, motion in (("a", orbit), ("b", instants)):
+        so.animate_shape(structure, motion, tmp_path / f"{name}.gif")
+    assert (tmp_path / "a.gif").read_bytes() == (tmp_path / "b.gif").read_bytes()

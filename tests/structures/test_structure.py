@@ -346,3 +346,17 @@ def test_a_structure_does_not_change(structure):
 def test_what_is_no_mesh_is_refused(arguments, message):
     with pytest.raises(so.InputError, match=message):
         so.Mesh(**{"points": [[0, 0], [1, 0]], "cells": {"line": [[0, 1]]}, **arguments})
+
+
+def test_observed_by_name():
+    """Labels of degrees of freedom are names, which verbs take for numbers."""
+    structure = so.structures.beam(0.7, 0.014, 0.014, 2.05e11, 7800.0, 4)
+    tip, middle = structure.dof(4, "z"), structure.dof(2, "z")
+    system = structure.system([so.CubicSpring(tip, 1e9)], [so.HarmonicLoad(tip, 0.3)], damping=so.Rayleigh(3.0, 0.0))
+    branch = so.frequency_response(system, (100.0, 101.0), harmonics=3, observe="2 z")
+    point = branch.points[0]
+    assert branch.observe == middle
+    assert branch.amplitude[0] == point.orbit.amplitude(middle)
+    assert so.condense(system, 100.0, observe="2 z").size == so.condense(system, 100.0, observe=[middle]).size
+    with pytest.raises(so.InputError, match=r"'2 zz' is none of the degrees of freedom \(did you mean"):
+        so.frequency_response(system, (100.0, 101.0), harmonics=3, observe="2 zz")

@@ -41,7 +41,9 @@ class SearchOptions(RunOptions, total=False):
         float | None,
         "Largest distance between neighbours in scaled arclength (short for `stepping=SteppingOptions(max_step=...)`).",
     ]
-    observe: Annotated[int | None, "DOF whose amplitude is reported; default the first loaded one."]
+    observe: Annotated[
+        int | str | None, "DOF whose amplitude is reported, by its number or name; default the first loaded one."
+    ]
     newton: Annotated[NewtonOptions | None, "Tolerances and iterations of Newton's method."]
     stepping: Annotated[SteppingOptions | None, "Step lengths, and the largest number of points."]
     stability: Annotated[

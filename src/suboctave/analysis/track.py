@@ -48,7 +48,7 @@ from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.perturbation import Kind
 from suboctave.harmonic.truncation import AdaptiveHarmonics
 from suboctave.kinds import KINDS, MOTION_KINDS, TRACKED_KINDS
-from suboctave.model.inputs import check_bounds, check_parameter, check_range, timed
+from suboctave.model.inputs import check_bounds, check_parameter, check_range, observed_dof, timed
 from suboctave.model.system import System
 from suboctave.options import with_options
 from suboctave.progress import reporting
@@ -319,7 +319,7 @@ def motion_kind(onto: Any) -> tuple[str, dict[str, float]] | None:
     return name, {**choices, **given}
 
 
-def begun(start: Any, onto: Any, observe: int | None) -> tuple[Any, str | None]:
+def begun(start: Any, onto: Any, observe: int | str | None) -> tuple[Any, str | None]:
     """What a curve begins at, and the kind that is chosen of those through it: a motion as a point of its own curve."""
     kind = motion_kind(onto)
     if kind is None:
@@ -330,7 +330,8 @@ def begun(start: Any, onto: Any, observe: int | None) -> tuple[Any, str | None]:
         )
     known = start.context or {} if isinstance(start, Bifurcation) else {}
     orbit = start.orbit
-    dof = next((d for d in (observe, known.get("observe")) if d is not None), orbit.system.observed_dof)
+    dof = next((d for d in (observe, known.get("observe")) if d is not None), None)
+    dof = observed_dof(orbit.system, dof)
     context = {**known, "observe": dof, "onto": {"name": kind[0], **kind[1]}}
     floquet, size = start.floquet, orbit.amplitude(dof)
     return Bifurcation(kind[0], orbit, floquet, orbit.residual, size, "omega", context=context), None

@@ -94,7 +94,10 @@ class RecognitionOptions(TimeOptions, total=False):
         "Motions whose points repeat to this share of their size (default 1e-6) are periodic; at least three "
         "repetitions are needed.",
     ]
-    observe: Annotated[int | None, "The degree of freedom whose amplitude is reported; default that of the first load."]
+    observe: Annotated[
+        int | str | None,
+        "The degree of freedom whose amplitude is reported, by its number or name; default that of the first load.",
+    ]
 
 
 class BasinOptions(RecognitionOptions, ParallelOptions, total=False):

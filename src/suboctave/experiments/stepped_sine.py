@@ -110,7 +110,7 @@ def stepped_sine(
     return out
 
 
-def check_stepped_sine(system: System, omega: Any, observe: int | None = None, **arguments: Any) -> None:
+def check_stepped_sine(system: System, omega: Any, observe: int | str | None = None, **arguments: Any) -> None:
     """Refuse arguments of `stepped_sine`; nothing is computed."""
     _Test(system, checked_integration(system, {"observe": observe}), omega, **{"seed": 0, **arguments})
 

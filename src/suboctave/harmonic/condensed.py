@@ -369,7 +369,10 @@ def linear_part_of(
 
 
 def condense(
-    system: System, omega: float | tuple[float, float], harmonics: int = 15, observe: int | Sequence[int] = ()
+    system: System,
+    omega: float | tuple[float, float],
+    harmonics: int = 15,
+    observe: int | str | Sequence[int | str] = (),
 ) -> LinearPart:
     """The linear part that verbs make by themselves, to look at before they work, or to share by `linear=`.
 
@@ -383,13 +386,13 @@ def condense(
     harmonics
         Highest multiple of it that motions will have; motions beyond find what they need.
     observe
-        Degrees of freedom whose motion should be as exact as that at the forces.
+        Degrees of freedom, by number or name, whose motion should be as exact as that at the forces.
     """
     check_is_system(system)
     highest = float(np.max(omega))
     if not (math.isfinite(highest) and highest > 0.0):
         raise InputError(f"omega must be a positive frequency or a range of frequencies, not {shortened(omega)}")
-    observed = [observe] if isinstance(observe, int | np.integer) else list(observe)
+    observed = [observe] if isinstance(observe, int | np.integer | str) else list(observe)
     chosen = [observed_dof(system, dof) for dof in observed] or [system.observed_dof]
     return linear_part_of(system, None, (check_count("harmonics", harmonics) + 0.5) * highest, None, chosen)
 

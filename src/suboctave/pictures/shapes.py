@@ -1,7 +1,7 @@
 """Deformed structures: a field of displacements on the mesh, as a figure, and motions over one period as a moving one.
 
-Fields are plain arrays, (n,) or (T, n), by the degrees of freedom of a structure: a mode, the null vector of a
-bifurcation, displacements at instants of a motion.
+Fields are plain arrays, (n,) or (T, n), by the degrees of freedom of a structure, such as a mode; or motions, of which
+instants are drawn.
 """
 
 from __future__ import annotations
@@ -32,6 +32,8 @@ _DRAWN = 0.15
 _THIN = 0.12
 #: where shapes are drawn: left, right, bottom and top as shares of the page
 _ROOM = (0.03, 0.8, 0.07, 0.9)
+#: instants of a period
+_FRAMES = 48
 #: faces from which edges between them are not drawn
 _MANY = 1200
 
@@ -61,12 +63,14 @@ def plot_shape(
     structure
         With mesh and labels.
     field
-        Displacements (n,) of its degrees of freedom, in any unit.
+        Displacements (n,) of its degrees of freedom, in any unit; or a periodic motion, a point of a branch or a
+        bifurcation, drawn at the instant of the largest displacements.
     path
         Where the figure is saved: .png, .svg or .pdf.
     """
     check_path(path)
-    drawn = _Shape(structure, np.asarray(field)[None], dict(options))
+    shape = np.asarray(field) if (motion := _instants(field)) is None else max(motion, key=np.linalg.norm)
+    drawn = _Shape(structure, shape[None], dict(options))
     drawn.show(0)
     if path is not None:
         save_figure(drawn.figure, path)
@@ -85,8 +89,8 @@ def animate_shape(
     structure
         With mesh and labels.
     snapshots
-        Displacements (T, n) at T equal steps over one period, the first instant not repeated at the end: of an orbit,
-        `orbit.displacement(np.arange(T) / T * orbit.period).T`.
+        Displacements (T, n) at T equal steps over one period, the first instant not repeated at the end; or a periodic
+        motion, a point of a branch or a bifurcation, for 48 of them.
     path
         A .gif file; one that is there is replaced.
     seconds
@@ -98,6 +102,7 @@ def animate_shape(
     check_numbers(seconds=seconds)
     if not seconds > 0.0:
         raise InputError(f"seconds={seconds}: must be above 0")
+    snapshots = snapshots if (motion := _instants(snapshots)) is None else motion
     if np.ndim(snapshots) != 2:
         raise InputError(f"snapshots are an array (T, {structure.n}), not of the shape {np.shape(snapshots)}")
     from PIL import Image
@@ -122,6 +127,14 @@ def animate_shape(
     target.parent.mkdir(parents=True, exist_ok=True)
     replace_file(target, lambda place: images[0].save(place, format="GIF", **more))
     return target
+
+
+def _instants(given: Any) -> np.ndarray | None:
+    """Displacements (T, n) over the period of a motion, or of the motion of what was given; None for an array."""
+    orbit = getattr(given, "orbit", given)
+    if not callable(getattr(orbit, "displacement", None)):
+        return None
+    return np.asarray(orbit.displacement(np.arange(_FRAMES) / _FRAMES * orbit.period).T)
 
 
 class _Shape:

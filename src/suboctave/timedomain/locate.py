@@ -150,7 +150,7 @@ def locate_by_shooting(
     tol: float = 1e-11,
     max_step: float = 0.05,
     max_iterations: int = 40,
-    observe: int | None = None,
+    observe: int | str | None = None,
     rtol: float = 1e-12,
     reach: float | None = None,
     budget: int | None = None,

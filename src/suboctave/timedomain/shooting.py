@@ -78,7 +78,7 @@ def shoot(
     values: Mapping[str, float] | None = None,
     tol: float = 1e-11,
     max_iterations: int = 30,
-    observe: int | None = None,
+    observe: int | str | None = None,
     rtol: float = 1e-12,
 ) -> PeriodicSolution:
     """A periodic motion near `state` (2n,) at fixed `omega`.

@@ -66,7 +66,7 @@ class FollowingStep(Step):
 
     harmonics: Any = None
     max_step: float | None = None
-    observe: int | None = None
+    observe: int | str | None = None
     newton: dict[str, Any] | None = None
     stepping: dict[str, Any] | None = None
     stability: Any = None

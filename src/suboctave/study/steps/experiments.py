@@ -113,7 +113,7 @@ class SteppedSineStep(Step, kind="stepped_sine", verb=stepped_sine):
     harmonics: list[float] = Field(default_factory=lambda: [0.0, 0.5, 1.0, 2.0, 3.0])
     noise: float = Field(default=0.0, ge=0.0)
     seed: int = Field(default=0, ge=0)
-    observe: int | None = None
+    observe: int | str | None = None
 
     def arguments(self, context: CheckContext | Context) -> dict[str, Any]:
         tap = self.tap and (self.tap[0], int(self.tap[1]), self.tap[2])
