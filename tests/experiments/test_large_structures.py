@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import scipy.sparse
+from chains import chain_matrices
 
 import suboctave as so
 from suboctave.errors import InputError
@@ -20,13 +20,7 @@ TIP = N - 1
 
 def chain(elements, load=0.05, **parameters):
     """Equal masses, the first held, the last with an element and the load; the first frequency is 1."""
-    stiffness = scipy.sparse.diags_array([-np.ones(N - 1), np.full(N, 2.0), -np.ones(N - 1)], offsets=[-1, 0, 1])
-    stiffness = stiffness.tolil()
-    stiffness[TIP, TIP] = 1.0
-    angle = 0.5 * np.pi / (N + 0.5)
-    tip = np.sin(angle * N) ** 2 / np.sum(np.sin(angle * np.arange(1, N + 1)) ** 2)
-    stiffness = tip * stiffness.tocsr() / (2.0 * np.sin(0.5 * angle)) ** 2
-    mass = tip * scipy.sparse.eye_array(N).tocsr()
+    mass, stiffness = chain_matrices(N)
     damping = 0.1 * mass + 0.002 * stiffness
     return so.System(mass, damping, stiffness, elements, [so.HarmonicLoad(TIP, load)], parameters)
 

@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-import scipy.sparse
+from chains import chain_matrices
 
 import suboctave as so
 from suboctave.curves import starts
@@ -21,14 +21,7 @@ def between_stops(system_of, tip, Kc, p):
 
 
 def chain(n=10):
-    """Its first natural frequency is 1, and so is the mass of that mode by the last mass."""
-    stiffness = scipy.sparse.diags_array([-np.ones(n - 1), np.full(n, 2.0), -np.ones(n - 1)], offsets=[-1, 0, 1])
-    stiffness = stiffness.tolil()
-    stiffness[n - 1, n - 1] = 1.0
-    mass = scipy.sparse.eye_array(n).tocsr()
-    squares, shapes = np.linalg.eigh(stiffness.toarray())
-    modal = shapes[n - 1, 0] ** 2
-    mass, stiffness = modal * mass, modal / squares[0] * stiffness.tocsr()
+    mass, stiffness = chain_matrices(n)
     return between_stops(
         lambda *parts: so.System(mass, 0.02 * mass + 0.04 * stiffness, stiffness, *parts), n - 1, 4.7, 0.8
     )

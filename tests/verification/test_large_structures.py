@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import scipy.sparse
+from chains import chain_matrices
 
 import suboctave as so
 from suboctave.projection import system_of_motions
@@ -18,13 +18,7 @@ TIP = N - 1
 
 def chain(elements):
     """Equal masses, the first held, the last with an element and the load; the first frequency is 1."""
-    stiffness = scipy.sparse.diags_array([-np.ones(N - 1), np.full(N, 2.0), -np.ones(N - 1)], offsets=[-1, 0, 1])
-    stiffness = stiffness.tolil()
-    stiffness[TIP, TIP] = 1.0
-    angle = 0.5 * np.pi / (N + 0.5)
-    tip = np.sin(angle * N) ** 2 / np.sum(np.sin(angle * np.arange(1, N + 1)) ** 2)
-    stiffness = tip * stiffness.tocsr() / (2.0 * np.sin(0.5 * angle)) ** 2
-    mass = tip * scipy.sparse.eye_array(N).tocsr()
+    mass, stiffness = chain_matrices(N)
     return so.System(mass, 0.02 * mass + 0.02 * stiffness, stiffness, elements, [so.HarmonicLoad(TIP, 0.05)])
 
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import functools
 import inspect
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -404,7 +405,7 @@ def _entries(made: Any) -> Iterator[tuple[str, Any, On]]:
             yield name, kind, places[0] if places else On()
 
 
-class TimeResult(Stored):
+class TimeResult(Stored, ABC):
     """A result of time integration: trajectories, sections, diagrams, exponents, basins, tests, verifications.
 
     `contents` says in files what it is, and `picture` which function of `pictures.in_time` draws it. Fields that say
@@ -445,14 +446,18 @@ class TimeResult(Stored):
         self.projection, self.lost, self.system = small, lost, small.structure
         return self
 
-    def __repr__(self) -> str:
-        if self.projection is None:
-            return self._in_words()
-        return f"{self._in_words()}\n  {self.projection.words}{lost_in_words(self.lost)}"
+    @property
+    def basis(self) -> str:
+        """In which modes a large structure was integrated, and with which error; empty for one that was taken as it is."""
+        return "" if self.projection is None else self.projection.words + lost_in_words(self.lost)
 
+    def __repr__(self) -> str:
+        first, *more = self._in_words().splitlines()
+        return "\n".join([first, *([f"  {self.basis}"] if self.basis else []), *more])
+
+    @abstractmethod
     def _in_words(self) -> str:
-        """The result in a line."""
-        raise NotImplementedError
+        """The result in a line, and what needs attention in further ones."""
 
     def to_dataframe(self) -> pandas.DataFrame:
         """The result as a table; the class says what its rows are."""
@@ -460,8 +465,9 @@ class TimeResult(Stored):
 
         return pd.DataFrame(self._columns())
 
+    @abstractmethod
     def _columns(self) -> Mapping[str, Any]:
-        raise NotImplementedError
+        """The columns of the table, by name."""
 
     def _derived(self) -> Mapping[str, Any]:
         """Variables `(axes, values)` and attributes of the dataset that are no fields."""
@@ -515,7 +521,7 @@ class TimeResult(Stored):
             (arrays if isinstance(value, tuple) else own)[name] = value
         produced = {"dofs": n, "system": self.system.name, "suboctave": __version__}
         if self.projection is not None:
-            produced["projection"] = self.projection.words + lost_in_words(self.lost)
+            produced["projection"] = self.basis
         if projected and self.projection is not None:
             arrays = {name: _as_kept(*entry) for name, entry in arrays.items()}
             arrays |= {"shapes": (("dof", "coordinate"), self.projection.shapes)}

@@ -129,12 +129,15 @@ class Reduction:
         if self.projected.shapes is None:
             return self
         at = self._expressions(values)
-        if any(
+        serving = next((one for one in (self, *self._larger.values()) if one._serves(frequency, at)), None)
+        return serving or _kept(self._larger, (frequency, at.tobytes()), lambda: self._grown_to(frequency, values, at))
+
+    def _serves(self, frequency: float, at: Array) -> bool:
+        """Whether it was tested there, or near by."""
+        return any(
             np.all(np.abs(at - tested) <= _TRUSTED * np.abs(tested)) and covers >= frequency
             for tested, covers in self._tested
-        ):
-            return self
-        return _kept(self._larger, (frequency, at.tobytes()), lambda: self._grown_to(frequency, values, at))
+        )
 
     def _grown_to(self, frequency: float, values: Mapping[str, float], at: Array) -> Reduction:
         larger = copy.copy(self)

@@ -23,6 +23,7 @@ from scipy.linalg import eigh
 
 from suboctave.errors import InputError
 from suboctave.model.elements.base import Array, BaseElement, Place
+from suboctave.model.elements.coupled import CoupledElement
 from suboctave.model.loads import HarmonicLoad
 from suboctave.model.system import System
 
@@ -167,8 +168,8 @@ def _seen_element(element: BaseElement, n: int, seen: _Seen) -> BaseElement:
     result, r = copy.copy(element), seen.shapes.shape[1]
     along, inputs = seen(element.direction(n)), np.array([seen(row) for row in element.inputs(n)])
     result.place = Place(element.label, None, along)
-    if hasattr(element, "input_places"):
-        result.input_places = tuple(Place(element.label, None, row) for row in inputs)  # type: ignore[attr-defined]
+    if isinstance(result, CoupledElement):
+        result.input_places = tuple(Place(element.label, None, row) for row in inputs)
     if not (np.array_equal(result.direction(r), along) and np.array_equal(result.inputs(r), inputs)):
         raise InputError(
             f"{element.label} has a way of its own to say where it acts, so that {n} degrees of freedom cannot be "

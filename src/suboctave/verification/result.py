@@ -107,6 +107,9 @@ class VerifiedBifurcation:
 
 
 _KINDS: dict[Any, type] = {"int": int, "float": float, "str": str, "bool": bool}
+#: columns of the table behind those that say where a point lies
+_OTHERS = ("amplitude", "distance", "multiplier_error", "stable", "computed", "outcome", "margin", "reason")
+_LEADING = ("multiplier_real", "multiplier_imag")
 #: columns of points and of bifurcations in a dataset, with their types
 POINT_COLUMNS, EVENT_COLUMNS = (
     {column.name: _KINDS[column.type] for column in fields(kind) if column.type in _KINDS}
@@ -115,9 +118,12 @@ POINT_COLUMNS, EVENT_COLUMNS = (
 VERDICTS = ("stable", "computed")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class BranchVerification(TimeResult):
     """What shooting says of a branch.
+
+    Its table (`to_dataframe`) has one row per point: distance, true multiplier that leads, errors, verdicts, outcome
+    and reason.
 
     Attributes
     ----------
@@ -197,18 +203,14 @@ class BranchVerification(TimeResult):
         }
         return xarray.Dataset(dict(flat(variables)), attrs=attributes)
 
-    def to_dataframe(self) -> pandas.DataFrame:
-        """One row per point: distance, true multiplier that leads, errors, verdicts, outcome and reason."""
-        import pandas as pd
-
-        names = ["index", "omega", "amplitude", "distance", "multiplier_error", "stable", "computed", "outcome"]
-        names += ["multiplier_real", "multiplier_imag", "margin", "reason"]
-        frame = pd.DataFrame([{name: getattr(p, name, None) for name in names} for p in self.points], columns=names)
+    def _columns(self) -> Mapping[str, Any]:
         leading = np.array([p.multipliers[0] if len(p.multipliers) else np.nan for p in self.points], dtype=complex)
-        frame["multiplier_real"], frame["multiplier_imag"] = leading.real, leading.imag
+        columns: dict[str, Any] = {name: [getattr(p, name) for p in self.points] for name in ("index", "omega")}
         if (name := self.branch.name) != "omega":
-            frame.insert(2, parameter_column(name, names), self.branch.parameter(name)[frame["index"].astype(int)])
-        return frame
+            at = self.branch.parameter(name)[np.array(columns["index"], dtype=int)]
+            columns[parameter_column(name, [*columns, *_OTHERS, *_LEADING])] = at
+        columns |= {name: [getattr(p, name) for p in self.points] for name in _OTHERS}
+        return columns | dict(zip(_LEADING, (leading.real, leading.imag), strict=True))
 
     def bifurcations_frame(self) -> pandas.DataFrame:
         """One row per bifurcation: kind, frequencies, distance, whether it is confirmed, why."""
@@ -232,10 +234,9 @@ class BranchVerification(TimeResult):
         outcomes = [point.outcome for point in self.points]
         return plot_verified(self.branch.to_xarray(), places, outcomes, wrong, path=path, **options)
 
-    def __repr__(self) -> str:
+    def _in_words(self) -> str:
         wrong = [*self.disagreements, *(b for b in self.bifurcations if not b.agrees)]
         lines = [f"BranchVerification: {self.summary}", *(f"  {one!r}" for one in wrong[:8])]
-        lines[1:1] = [f"  {self.basis}"] if self.basis else []
         if len(wrong) > 8:
             lines.append(f"  and {len(wrong) - 8} more")
         return "\n".join(lines)
