@@ -448,7 +448,7 @@ class TimeResult(Stored, ABC):
 
     @property
     def basis(self) -> str:
-        """In which modes a large structure was integrated, and with which error; empty for one that was taken as it is."""
+        """In which modes a large structure was integrated, with which error; empty for one that was taken as it is."""
         return "" if self.projection is None else self.projection.words + lost_in_words(self.lost)
 
     def __repr__(self) -> str:
