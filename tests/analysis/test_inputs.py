@@ -52,7 +52,10 @@ RESPONSE = {
     "tiny step": (lambda s, b: so.frequency_response(s, (1, 2), max_step=1e-9), "max_step=1e-09"),
     "dof": (lambda s, b: so.frequency_response(s, (1, 2), observe=1), "1 DOFs, numbered from 0"),
     "negative dof": (lambda s, b: so.frequency_response(s, (1, 2), observe=-1), "observe=-1 is out of range"),
-    "text dof": (lambda s, b: so.frequency_response(s, (1, 2), observe="x"), "observe='x' is none of the degrees of freedom: they have no names"),
+    "text dof": (
+        lambda s, b: so.frequency_response(s, (1, 2), observe="x"),
+        "observe='x' is none of the degrees of freedom: they have no names",
+    ),
     "bare function": (lambda s, b: so.frequency_response(s, (1, 2), events=[len]), "must be Event objects"),
     "number for events": (lambda s, b: so.frequency_response(s, (1, 2), events=3), "must be Event objects"),
     "same name": (
