@@ -286,7 +286,7 @@ EYE = np.eye(3)
         ({"stiffness": np.ones(3)}, "must be a matrix of numbers, not of shape"),
         ({"stiffness": "K.npz"}, "must be a matrix of numbers"),
         ({"stiffness": None}, "the stiffness is missing"),
-        ({"stiffness": EYE * (1 + 0.1j)}, "the stiffness is complex: structural"),
+        ({"stiffness": EYE * (1 + 0.1j)}, "the stiffness is complex: give its real part, and structural"),
         ({"stiffness": np.array([[1, 0, 0], [0, np.nan, 0], [0, 0, 1]])}, r"not finite: \[1, 1\] is nan"),
         (
             {"stiffness": np.array([[1, 0, 0], [0, 1, 2], [0, 2.5, 1]])},

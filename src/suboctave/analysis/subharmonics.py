@@ -239,7 +239,8 @@ def periodic_orbit(
     with one_thread():
         if settle:
             end = settle * order * 2.0 * np.pi / omega
-            trajectory = integrate(system, given, np.array([0.0, end]), omega, system.parameters, rtol=1e-8)
+            moving = system.viscous_equivalent()
+            trajectory = integrate(moving, given, np.array([0.0, end]), omega, moving.parameters, rtol=1e-8)
             given = np.concatenate((trajectory.x[-1], trajectory.v[-1]))
         point = start_point(curve, omega, given, newton or NewtonOptions())
     own = (orbit := Sample(point).orbit).own_period

@@ -286,7 +286,7 @@ def _integrated(curve: MotionProblem, value: float, state: Array) -> Array:
     _, omega, values = curve.split(curve.join(np.zeros(balance.dimension), value))
     samples = 8 * balance.basis.harmonics + 8
     times = np.linspace(0.0, 2.0 * math.pi * balance.basis.nu / omega, samples + 1)
-    trajectory = integrate(balance.system, state, times, omega, values, rtol=1e-6)
+    trajectory = integrate(balance.system.viscous_equivalent(), state, times, omega, values, rtol=1e-6)
     spectrum = np.fft.rfft(balance.linear.read(trajectory.x[:-1]), axis=0) / samples
     return curve.join(spectrum_to_real(spectrum, balance.basis.harmonics), value)
 

@@ -88,7 +88,7 @@ class Hill(StabilityMethod):
             raise InputError(f"unknown selection {self.selection!r}{suggest(str(self.selection), SELECTIONS)}")
 
     def multipliers(self, state: BalanceState) -> FloquetResult:
-        return hill_multipliers(state, self.selection)
+        return _without_equation(state, self.name) or hill_multipliers(state, self.selection)
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ class KoopmanHill(StabilityMethod):
             raise InputError(f"subharmonic must be True or False, not {self.subharmonic!r}")
 
     def multipliers(self, state: BalanceState) -> FloquetResult:
-        return koopman_hill_multipliers(state, self.subharmonic)
+        return _without_equation(state, self.name) or koopman_hill_multipliers(state, self.subharmonic)
 
 
 @dataclass(frozen=True)
@@ -166,6 +166,14 @@ class Arbitration(StabilityMethod):
             if joint.decided:
                 break
         return replace(joint, note=_explanation(state, results, joint, contradictions), witnesses=tuple(results))
+
+
+def _without_equation(state: BalanceState, name: str) -> FloquetResult | None:
+    """That a method does not apply, as the linear part has no equation of motion; None if it has."""
+    if state.balance.system.structural.zero:
+        return None
+    note = "Structural damping has no equation of motion, which this method needs: use the default"
+    return FloquetResult.inapplicable(2 * len(state.linear.equation_of_motion()[0]), name, note)
 
 
 def combined(a: FloquetResult, b: FloquetResult) -> tuple[FloquetResult, str]:

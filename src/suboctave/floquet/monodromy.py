@@ -50,6 +50,7 @@ from suboctave.floquet.exponentials import TURNS, structure
 from suboctave.floquet.propagate import closed, march, multipliers_and_shifts, response
 from suboctave.floquet.resolution import ACCURACY, divided, longest_rest, states_needed, stretches
 from suboctave.floquet.result import FloquetResult
+from suboctave.floquet.structural import with_structural_damping
 from suboctave.floquet.time_mesh import (
     NODES,
     ORDER,
@@ -483,6 +484,12 @@ _MOST_TURNS = 1e15
 
 def floquet_multipliers(state: BalanceState) -> FloquetResult:
     """Multipliers, error estimates and verdict of a solved motion, over the motion's own period (`nu` load periods)."""
+    result = _of_equation(state)
+    return result if state.balance.system.structural.zero else with_structural_damping(state, result)
+
+
+def _of_equation(state: BalanceState) -> FloquetResult:
+    """Of the linear part's equation of motion."""
     check_time()
     motion = _Linearised(state)
     mu, errors = motion.others()

@@ -25,14 +25,22 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
-from suboctave.compiled import kernel
 from suboctave.errors import ConvergenceError, InputError, shortened
 from suboctave.harmonic.basis import Array, ComplexArray
-from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices, in_words, natural_frequencies
+from suboctave.harmonic.linear_part import (
+    LinearPart,
+    StructuralMatrices,
+    damping_words,
+    differentiated,
+    entries_at,
+    in_words,
+    natural_frequencies,
+)
 from suboctave.harmonic.reduction import Reduction
 from suboctave.lazy import lazy
 from suboctave.model.inputs import check_count, check_is_system, observed_dof
-from suboctave.model.matrices import MatrixCoefficient
+from suboctave.model.matrices import viscous_damping
+from suboctave.model.projected import projected_words
 from suboctave.model.system import System
 
 #: part of a direction that others do not hold, relative, below which it depends on them
@@ -71,19 +79,8 @@ class Blocks(NamedTuple):
         return Blocks(_transposed(self.qq), _transposed(self.zq), _transposed(self.qz), zz)
 
 
-@kernel()
-def _dynamic(entries, frequency, order, out):
-    """`K - Omega^2 M + i Omega C` into `out` (F, .), differentiated by Omega; entries (3, .): M, C, K."""
-    for f in range(frequency.shape[0]):
-        w = frequency[f]
-        inertia = -w * w if order == 0 else -2.0 * w if order == 1 else -2.0
-        damping, static = w if order == 0 else 1.0 if order == 1 else 0.0, 1.0 if order == 0 else 0.0
-        for i in range(entries.shape[1]):
-            out[f, i] = complex(static * entries[2, i] + inertia * entries[0, i], damping * entries[1, i])
-
-
 class Stack(NamedTuple):
-    """M, C, K in the coordinates (q, z), all entries in a row, (3, .); how many q and z; if zz is a diagonal."""
+    """M, C, K, S in the coordinates (q, z), all entries in a row, (4, .); how many q and z; if zz is a diagonal."""
 
     entries: Array
     sizes: tuple[int, int]
@@ -98,11 +95,10 @@ class Stack(NamedTuple):
         rows = [np.concatenate([one.ravel() for one in part]) for part in parts]
         return cls(np.array(rows), parts[0][1].shape, diagonal)
 
-    def at(self, frequency: Array, order: int) -> Blocks:
-        """`K - Omega^2 M + i Omega C` at frequencies, differentiated by Omega."""
+    def at(self, frequency: NDArray[Any], order: int) -> Blocks:
+        """The dynamic stiffness at frequencies, differentiated by Omega."""
         (m, s), count = self.sizes, len(frequency)
-        values = np.empty((count, self.entries.shape[1]), dtype=complex)
-        _dynamic(self.entries, frequency, order, values)
+        values = entries_at(self.entries, frequency, order)
         a, b, c = m * m, m * m + m * s, m * m + 2 * m * s
         inner = values[:, c:] if self.diagonal else values[:, c:].reshape(count, s, s)
         return Blocks(
@@ -145,8 +141,8 @@ class Condensed:
         self._other: Condensed | None = None
         self._wider: Condensed | None = None
         #: what was asked for last, by frequencies
-        self._last: tuple[Array, tuple[Blocks, ComplexArray, ComplexArray]] | None = None
-        #: M, C, K, (3, r, r)
+        self._last: tuple[NDArray[Any], tuple[Blocks, ComplexArray, ComplexArray]] | None = None
+        #: M, C, K, S, (4, r, r)
         self._matrices = np.array([matrix.value(values) for matrix in self.projected.matrices])
 
     @property
@@ -164,10 +160,16 @@ class Condensed:
         return natural_frequencies(self)
 
     def __repr__(self) -> str:
-        whole = self.projected.shapes is None
-        shown = in_words(self, self.system.n, "as they are" if whole else f"{len(self._matrices[0])} modes")
-        for_ = f"\n  for frequencies up to {self.covers:.6g}; error of the flexibility there {self.error:.1e}"
-        return shown if whole else shown + for_
+        how = "as they are" if self.projected.shapes is None else "projected"
+        return "\n  ".join([in_words(self, self.system.n, how), *self.words])
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """See `LinearPart.words`."""
+        own = damping_words(self.system)
+        if self.projected.shapes is None:
+            return own
+        return projected_words(self.system.n, len(self._matrices[0]), self.covers, self.error), *own
 
     # ------------------------------------------------------------------------------------------------- other values
     def rebuilt(self, values: Mapping[str, float]) -> Condensed:
@@ -195,7 +197,7 @@ class Condensed:
     # -------------------------------------------------------------------------------------------------- coordinates
     @lazy
     def _coordinates(self) -> Coordinates:
-        mass, _, stiffness = self._matrices
+        mass, _, stiffness, _ = self._matrices
         mass, stiffness = 0.5 * (mass + mass.T), 0.5 * (stiffness + stiffness.T)
         values, modes = eigh(stiffness, mass)
         # a unit of stiffness that the structure has, also where some of it moves freely
@@ -213,7 +215,7 @@ class Condensed:
         return Coordinates(static, modes @ (null @ turn), squares, unit, held)
 
     def _split(self, matrices: Array) -> list[tuple[Array, Array, Array, Array]]:
-        """Matrices (3, r, r) in the coordinates (q, z), each as qq, qz, zq, zz."""
+        """Matrices (., r, r) in the coordinates (q, z), each as qq, qz, zq, zz."""
         left = np.concatenate((self._coordinates.static, self._coordinates.free), axis=1).T
         m, parts = self.size, []
         for matrix in matrices:
@@ -223,30 +225,26 @@ class Condensed:
 
     @lazy
     def _own(self) -> Stack:
-        """M, C, K in the coordinates (q, z)."""
+        """M, C, K, S in the coordinates (q, z)."""
         _, _, squares, unit, held = self._coordinates
-        mass, damping, _ = self._split(self._matrices)
+        mass, damping, _, structural = self._split(self._matrices)
         k = self._matrices[2]
         skew = self._split(0.5 * (k - k.T)[None])[0]
         # K = S - unit M, and S has no coupling
         whole = (held - unit * mass[0], -unit * mass[1], -unit * mass[2], np.diag(squares))
         mass = (*mass[:3], np.eye(len(squares)))
         stiffness = tuple(one + other for one, other in zip(whole, skew, strict=True))
-        return Stack.of([mass, damping, stiffness])
+        return Stack.of([mass, damping, stiffness, structural])
 
     # ------------------------------------------------------------------------------------------------------- blocks
-    def _blocks(self, frequency: Array, names: tuple[str, ...] = (), order: int = 0) -> Blocks | None:
+    def _blocks(self, frequency: NDArray[Any], names: tuple[str, ...] = (), order: int = 0) -> Blocks | None:
         """Z in the coordinates (q, z), differentiated; None for zero."""
         if not names:
             return self._own.at(frequency, order)
-        derivatives = [_derivative(matrix, names, self.values) for matrix in self.projected.matrices]
-        if all(one is None for one in derivatives):
-            return None
-        zero = np.zeros_like(self._matrices[0])
-        parts = self._split(np.array([zero if one is None else one for one in derivatives]))
-        return Stack.of(parts).at(frequency, order)
+        parts = differentiated(self.projected.matrices, names, self.values)
+        return None if parts is None else Stack.of(self._split(parts)).at(frequency, order)
 
-    def _eliminated(self, frequency: Array) -> tuple[Blocks, ComplexArray, ComplexArray]:
+    def _eliminated(self, frequency: NDArray[Any]) -> tuple[Blocks, ComplexArray, ComplexArray]:
         """Z at frequencies, `Z_zz^-1 Z_zq`, and the transpose of `Z_qz Z_zz^-1`; what was asked for last is kept."""
         if self._last is None or self._last[0] is not frequency:
             whole = self._own.at(frequency, 0)
@@ -257,7 +255,9 @@ class Condensed:
             self._last = frequency, (whole, right, left)
         return self._last[1]
 
-    def _differentiated(self, frequency: Array, by: tuple[tuple[tuple[str, ...], int], ...]) -> ComplexArray | None:
+    def _differentiated(
+        self, frequency: NDArray[Any], by: tuple[tuple[tuple[str, ...], int], ...]
+    ) -> ComplexArray | None:
         """A, differentiated by at most two things: each some names, or none and an order in Omega of one."""
         whole, right, left = self._eliminated(frequency)
         if not by:
@@ -283,7 +283,7 @@ class Condensed:
         return all(np.abs(m - m.T).max() <= _ROUNDING * np.abs(m).max() for m in self._matrices)
 
     # ----------------------------------------------------------------------------------------------------- contract
-    def stiffness(self, frequency: Array, order: int = 0) -> ComplexArray:
+    def stiffness(self, frequency: NDArray[Any], order: int = 0) -> ComplexArray:
         """See `LinearPart.stiffness`."""
         result = self._differentiated(frequency, (((), 1),) * order)
         assert result is not None
@@ -300,9 +300,13 @@ class Condensed:
         return coordinates_among(self.reduction.directions, direction)
 
     def equation_of_motion(self) -> tuple[Array, Array, Array]:
-        """M, C, K of the structure in its basis."""
-        mass, damping, stiffness = self._matrices
-        return mass, damping, stiffness
+        """M, C, K of the structure in its basis, C with what stands for structural damping."""
+        return self._equation
+
+    @lazy
+    def _equation(self) -> tuple[Array, Array, Array]:
+        mass, damping, stiffness, structural = self._matrices
+        return mass, damping + viscous_damping(mass, stiffness, structural), stiffness
 
     def read(self, motion: Array) -> Array:
         """See `LinearPart.read`."""
@@ -336,13 +340,6 @@ def _is_diagonal(matrix: Array) -> bool:
     size = np.sqrt(np.abs(np.multiply.outer(matrix.diagonal(), matrix.diagonal())))
     beside = np.abs(matrix - np.diag(matrix.diagonal()))
     return bool(np.all(beside <= _BESIDE * np.maximum(size, np.abs(matrix).max() * _ROUNDING)))
-
-
-def _derivative(matrix: MatrixCoefficient, names: tuple[str, ...], values: Mapping[str, float]) -> Array | None:
-    derived: MatrixCoefficient | None = matrix
-    for name in names:
-        derived = derived and derived.derivative(name)
-    return None if derived is None else derived.value(values)
 
 
 # ------------------------------------------------------------------------------------------------------- which form

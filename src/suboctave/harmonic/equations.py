@@ -71,7 +71,7 @@ class Equations:
         self.linear: LinearPart = StructuralMatrices(system, self.values) if linear is None else linear
         self.size = self.linear.size
         #: parameters that the linear part depends on
-        self.matrix_names = system.mass.names | system.damping.names | system.stiffness.names
+        self.matrix_names = frozenset[str]().union(*(matrix.names for matrix in system.linear_parts))
         #: elements that share the displacement along one direction, and those with channels of their own
         self.groups = self._grouped()
         self.own = [self._own_channel(i, e) for i, e in enumerate(system.elements) if e.own_nodes]

@@ -5,7 +5,8 @@ with the amplitudes `s` of element forces minus loads by
 
     A(Omega) x + s = 0.
 
-With all degrees of freedom unknown `A = K - Omega^2 M + i Omega C`; `condensed` eliminates those that no force acts on.
+With all degrees of freedom unknown `A = K - Omega^2 M + i Omega C + i sgn(Omega) S`, S the structural damping;
+`condensed` eliminates those that no force acts on.
 Whatever is above asks for A and its derivatives with respect to Omega and the parameters, and for the matrices of an
 equation of motion with the same response (for monodromy and scaling); it never sees which form it is given. The
 structure has n DOFs, its equation of motion N, and `size` of them, or directions through them, are unknown.
@@ -13,7 +14,7 @@ structure has n DOFs, its equation of motion N, and `size` of them, or direction
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -22,6 +23,8 @@ from numpy.typing import NDArray
 
 from suboctave.compiled import kernel
 from suboctave.harmonic.basis import Array, ComplexArray
+from suboctave.lazy import lazy
+from suboctave.model.matrices import MatrixCoefficient, viscous_damping
 from suboctave.model.system import System
 
 
@@ -31,11 +34,17 @@ class LinearPart(Protocol):
 
     size: int
 
+    @property
+    def words(self) -> tuple[str, ...]:
+        """What a result rests on, in sentences: the projection and its error, structural damping."""
+
     def rebuilt(self, values: Mapping[str, float]) -> LinearPart:
         """The same part at other parameter values."""
 
-    def stiffness(self, frequency: Array, order: int = 0) -> ComplexArray:
-        """`d^order A / d Omega^order`, shape (len(frequency), size, size)."""
+    def stiffness(self, frequency: NDArray[Any], order: int = 0) -> ComplexArray:
+        """`d^order A / d Omega^order`, shape (len(frequency), size, size); at complex frequencies, of vibrations that
+        decay or grow, structural damping acts by the sign of their real part.
+        """
 
     def stiffness_by(self, frequency: Array, names: tuple[str, ...], order: int = 0) -> ComplexArray | None:
         """`d^order A / d Omega^order` differentiated by one or two parameters; None if zero."""
@@ -47,7 +56,10 @@ class LinearPart(Protocol):
         """
 
     def equation_of_motion(self) -> tuple[Array, Array, Array]:
-        """Mass, damping, stiffness (N, N) of an equation of motion with this response, N >= size."""
+        """Mass, damping, stiffness (N, N) of an equation of motion with this response, N >= size.
+
+        There is none of structural damping: its viscous equivalent stands for it (`System.viscous_equivalent`).
+        """
 
     def read(self, motion: Array) -> Array:
         """The unknowns (..., size) of a motion of the structure, (..., n); of a direction, what they do along it."""
@@ -74,42 +86,48 @@ class LinearPart(Protocol):
 
 
 class StructuralMatrices:
-    """Stiffness form straight from a system's M, C, K: `A = K - Omega^2 M + i Omega C`."""
+    """Stiffness form straight from a system's matrices: `A = K - Omega^2 M + i Omega C + i sgn(Omega) S`."""
 
     def __init__(self, system: System, values: Mapping[str, float] | None = None) -> None:
         self.system = system
         self.values = dict(system.parameters if values is None else values)
         self.size = system.n
-        #: M, C, K, shape (3, n, n)
-        self.matrices = np.array(system.matrices(self.values), dtype=float)
+        #: M, C, K, S, shape (4, n, n)
+        self.matrices = np.array([matrix.value(self.values) for matrix in system.linear_parts])
 
     def __repr__(self) -> str:
         return in_words(self, self.size, "as they are")
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """See `LinearPart.words`."""
+        return damping_words(self.system)
 
     def rebuilt(self, values: Mapping[str, float]) -> StructuralMatrices:
         """The same structure at other parameter values."""
         return StructuralMatrices(self.system, values)
 
-    def stiffness(self, frequency: Array, order: int = 0) -> ComplexArray:
+    def stiffness(self, frequency: NDArray[Any], order: int = 0) -> ComplexArray:
         """See `LinearPart.stiffness`."""
         return _blocks(self.matrices, frequency, order)
 
     def stiffness_by(self, frequency: Array, names: tuple[str, ...], order: int = 0) -> ComplexArray | None:
         """See `LinearPart.stiffness_by`."""
-        parts = self.system.matrix_derivatives(*names, values=self.values)
-        if all(part is None for part in parts):
-            return None
-        zero = np.zeros((self.size, self.size))
-        return _blocks(np.array([zero if part is None else part for part in parts]), frequency, order)
+        parts = differentiated(self.system.linear_parts, names, self.values)
+        return None if parts is None else _blocks(parts, frequency, order)
 
     def retain(self, direction: Array) -> Array:
         """All DOFs are unknowns."""
         return direction
 
     def equation_of_motion(self) -> tuple[Array, Array, Array]:
-        """M, C, K of the system."""
-        mass, damping, stiffness = self.matrices
-        return mass, damping, stiffness
+        """M, C, K of the system, C with what stands for structural damping."""
+        return self._equation
+
+    @lazy
+    def _equation(self) -> tuple[Array, Array, Array]:
+        mass, damping, stiffness, structural = self.matrices
+        return mass, damping + viscous_damping(mass, stiffness, structural), stiffness
 
     def expand(self, direction: Array) -> Array:
         """The unknowns are the DOFs of the equation of motion."""
@@ -144,6 +162,16 @@ def natural_frequencies(linear: LinearPart) -> Array:
     return np.sqrt(np.where(free, 0.0, np.maximum(values, 0.0)))
 
 
+def damping_words(system: System) -> tuple[str, ...]:
+    """What stability means with structural damping."""
+    if system.structural.zero:
+        return ()
+    return (
+        "Structural damping: multipliers are those of perturbations that it damps at their own frequencies, as there "
+        "is no equation of motion in time",
+    )
+
+
 def in_words(linear: LinearPart, dofs: int, how: str) -> str:
     """How many degrees of freedom are taken how, what is unknown, and the first natural frequencies."""
     lowest = natural_frequencies(linear)[:6]
@@ -155,27 +183,45 @@ def in_words(linear: LinearPart, dofs: int, how: str) -> str:
     )
 
 
-def _blocks(matrices: Array, frequency: Array, order: int) -> ComplexArray:
-    """`K - Omega^2 M + i Omega C` at the frequencies, or its first or second derivative by Omega; (F, n, n)."""
-    out = np.empty((len(frequency), *matrices.shape[1:]), dtype=complex)
-    dynamic_stiffness(matrices, frequency, order, out)
+def differentiated(
+    matrices: Sequence[MatrixCoefficient], names: tuple[str, ...], values: Mapping[str, float]
+) -> Array | None:
+    """Matrices (n, n) differentiated by parameters, all in one array; None where all are zero."""
+    found = []
+    for matrix in matrices:
+        derived: MatrixCoefficient | None = matrix
+        for name in names:
+            derived = derived and derived.derivative(name)
+        found.append(derived)
+    if all(one is None for one in found):
+        return None
+    n = matrices[0].n
+    return np.array([np.zeros((n, n)) if one is None else one.value(values) for one in found])
+
+
+def _blocks(matrices: Array, frequency: NDArray[Any], order: int) -> ComplexArray:
+    """The dynamic stiffness at the frequencies, or its first or second derivative by Omega; (F, n, n)."""
+    count, n, _ = matrices.shape
+    return entries_at(matrices.reshape(count, n * n), frequency, order).reshape(-1, n, n)
+
+
+def entries_at(entries: Array, frequency: NDArray[Any], order: int) -> ComplexArray:
+    """The same from all entries of M, C, K, S in rows, (4, .); (F, .)."""
+    out = np.empty((len(frequency), entries.shape[1]), dtype=complex)
+    dynamic_stiffness(entries, frequency.astype(complex), order, out)
     return out
 
 
 @kernel()
-def dynamic_stiffness(matrices, frequency, order, out):
-    """`K - Omega^2 M + i Omega C`, or its first or second derivative by Omega, into `out` (F, n, n); matrices: M, C,
-    K.
+def dynamic_stiffness(entries, frequency, order, out):
+    """`K - Omega^2 M + i Omega C + i sgn(Re Omega) S` into `out` (F, .), or its first or second derivative by Omega,
+    complex; entries (4, .): M, C, K, S.
     """
-    n = matrices.shape[1]
     for f in range(frequency.shape[0]):
-        om = frequency[f]
-        for i in range(n):
-            for j in range(n):
-                mass, damping, stiffness = matrices[0, i, j], matrices[1, i, j], matrices[2, i, j]
-                if order == 0:
-                    out[f, i, j] = complex(stiffness - om * om * mass, om * damping)
-                elif order == 1:
-                    out[f, i, j] = complex(-2.0 * om * mass, damping)
-                else:
-                    out[f, i, j] = complex(-2.0 * mass, 0.0)
+        w = frequency[f]
+        inertia = -w * w if order == 0 else -2.0 * w if order == 1 else complex(-2.0)
+        damping, static = w if order == 0 else complex(1.0 if order == 1 else 0.0), 1.0 if order == 0 else 0.0
+        side = static * np.sign(w.real)
+        for i in range(entries.shape[1]):
+            loss = damping * entries[1, i] + side * entries[3, i]
+            out[f, i] = static * entries[2, i] + inertia * entries[0, i] + complex(-loss.imag, loss.real)

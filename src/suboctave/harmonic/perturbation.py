@@ -21,8 +21,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from suboctave.harmonic.aft.channel import Channel
 from suboctave.harmonic.assembly import apply_blocks, toeplitz
@@ -54,21 +56,30 @@ def operator(state: BalanceState, kind: Kind, kappa: float = 0.0) -> np.ndarray:
         return state.jacobian
     if kind is Kind.HALF:
         return state.half_jacobian
-    at = Frequencies.of(state, kind, kappa)
-    size, count, frequency = state.balance.size, at.count, at.values * state.rate
-    out = np.zeros((count, size, count, size), dtype=complex)
+    return operator_at(state, Frequencies.of(state, kind, kappa).values[None] * state.rate)[0]
+
+
+def operator_at(state: BalanceState, frequency: NDArray[Any], order: int = 0) -> ComplexArray:
+    """J_kappa between waves at sets of consecutive frequencies (S, F), real or complex, rad per time, or its derivative
+    by a frequency that is added to all; (S, F size, F size).
+    """
+    sets, count = frequency.shape
+    size = state.balance.size
+    out = np.zeros((sets, count, size, count, size), dtype=complex)
     lag = np.arange(count)[:, None] - np.arange(count)
     for channel in state.channels:
-        for i, d in enumerate(channel.ins):
-            matrix = _two_sided(channel.stiffness(i), lag)
+        for i, d in enumerate(channel.ins if channel.moving or not order else ()):
+            matrix: Any = 0.0 if order else _two_sided(channel.stiffness(i), lag)
             if channel.moving:
-                matrix = matrix + _two_sided(channel.damping(i), lag) * (1j * frequency)
+                speed = 1j if order else 1j * frequency[:, None, :]
+                matrix = matrix + _two_sided(channel.damping(i), lag) * speed
             for row in np.flatnonzero(channel.out):
                 for column in np.flatnonzero(d):
-                    out[:, row, :, column] += channel.out[row] * d[column] * matrix
+                    out[:, :, row, :, column] += channel.out[row] * d[column] * matrix
     index = np.arange(count)
-    out[index, :, index, :] += state.linear.stiffness(frequency)
-    return out.reshape(count * size, count * size)
+    blocks = state.linear.stiffness(frequency.ravel(), order).reshape(sets, count, size, size)
+    out[:, index, :, index, :] += blocks.transpose(1, 0, 2, 3)
+    return out.reshape(sets, count * size, count * size)
 
 
 def _two_sided(spectrum: ComplexArray, lag: np.ndarray) -> ComplexArray:

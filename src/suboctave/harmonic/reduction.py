@@ -4,14 +4,14 @@ Forces act and displacements are read along m directions, the rows of D. The pro
 
     V^T M V y'' + V^T C V y' + V^T K V y = V^T D^T s,    q = D V y,
 
-has the structure's dynamic flexibility `G = D Z^-1 D^T`, `Z = K - Omega^2 M + i Omega C`, up to some frequency once V
-holds what the structure answers there. V grows by what is left over: with `R = D^T - Z V y`, the residual at some
-frequencies, the columns of `(K + s^2 M)^-1 R` are added, s > 0 a fixed frequency. For Rayleigh damping that is the
-block-Krylov basis which matches moments at `i s` (Bai, Applied Numerical Mathematics 43 (2002) 9-44), and any other
-damping, or other values of parameters in the matrices, find what they need in the same way. One factorisation serves
-all of it; the shift makes it one of a definite matrix for free bodies too. In exact arithmetic the error of G is
-`R^T Z^-1 R`, of second order in the residual where the matrices are symmetric, and is estimated by
-`R^T (K + s^2 M)^-1 R`.
+has the structure's dynamic flexibility `G = D Z^-1 D^T`, `Z = K - Omega^2 M + i Omega C + i S`, up to some frequency
+once V holds what the structure answers there. V grows by what is left over: with `R = D^T - Z V y`, the residual at
+some frequencies, the columns of `(K + s^2 M)^-1 R` are added, s > 0 a fixed frequency. For Rayleigh damping that is
+the block-Krylov basis which matches moments at `i s` (Bai, Applied Numerical Mathematics 43 (2002) 9-44), and any
+other damping, or other values of parameters in the matrices, find what they need in the same way. One factorisation
+serves all of it; the shift makes it one of a definite matrix for free bodies too. In exact arithmetic the error of G
+is `R^T Z^-1 R`, of second order in the residual where the matrices are symmetric, and is estimated by `R^T (K + s^2
+M)^-1 R`.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class Projected(NamedTuple):
     """A structure's matrices in a basis.
 
     matrices
-        M, C, K, (r, r).
+        M, C, K and the structural damping S, (r, r).
     shapes
         The basis V, (n, r); None for the structure's own degrees of freedom.
     seen
@@ -68,7 +68,7 @@ class Projected(NamedTuple):
         the structure itself.
     """
 
-    matrices: tuple[MatrixCoefficient, MatrixCoefficient, MatrixCoefficient]
+    matrices: tuple[MatrixCoefficient, ...]
     shapes: Array | None
     seen: Array
     covers: float
@@ -93,7 +93,7 @@ class Reduction:
         self.served = served
         self.observed = observed
         self.scale = scale
-        self._matrices = system.mass, system.damping, system.stiffness
+        self._matrices = system.linear_parts
         self._shapes = np.zeros((system.n, 0))
         self._solve: Any = None
         #: expressions in the matrices and the highest frequency, where the basis was tested
@@ -183,9 +183,9 @@ class Reduction:
     def _left_over(self, frequency: float, small: list[Array], images: list[Array]) -> tuple[float, Array]:
         """The estimated error of the flexibility at a frequency, relative, and what a better basis needs, (n, 2 m).
 
-        small, images: M, C, K in the basis, (r, r), and of the basis, (n, r).
+        small, images: M, C, K, S in the basis, (r, r), and of the basis, (n, r).
         """
-        columns, factors = self.served.T, (-(frequency**2), 1j * frequency, 1.0)
+        columns, factors = self.served.T, (-(frequency**2), 1j * frequency, 1.0, 1j)
         y = np.linalg.solve(sum(f * z for f, z in zip(factors, small, strict=True)), self._shapes.T @ columns)
         rest = columns - sum(f * (image @ y) for f, image in zip(factors, images, strict=True))
         answers = self._solve(np.concatenate((rest.real, rest.imag), axis=1))
@@ -215,16 +215,15 @@ class Reduction:
 
     def _project(self, values: Mapping[str, float]) -> Projected:
         """All matrices in the basis, turned to its modes at these values."""
-        mass, _, stiffness = (self._shapes.T @ (m.sparse_value(values) @ self._shapes) for m in self._matrices)
+        mass, _, stiffness, _ = (self._shapes.T @ (m.sparse_value(values) @ self._shapes) for m in self._matrices)
         _, modes = eigh(0.5 * (stiffness + stiffness.T), 0.5 * (mass + mass.T))
         shapes = self._shapes @ modes
         matrices = tuple(matrix.projected(shapes) for matrix in self._matrices)
-        assert len(matrices) == 3
         top = max(covers for _, covers in self._tested)
         seen = self.directions @ shapes
-        m, c, k = (matrix.value(values) for matrix in matrices)
+        m, c, k, s = (matrix.value(values) for matrix in matrices)
         exact = exact_flexibility(self.system, self.directions, top, values)
-        off = np.abs(seen @ np.linalg.solve(k - top**2 * m + 1j * top * c, seen.T) - exact)
+        off = np.abs(seen @ np.linalg.solve(k - top**2 * m + 1j * (top * c + s), seen.T) - exact)
         size = np.sqrt(np.abs(exact.diagonal()))
         error = float((off / np.multiply.outer(size, size)).max())
         if not error <= _WRONG:
@@ -252,11 +251,13 @@ def _kept(
 
 
 def _flexibilities(small: list[Array], seen: Array, top: float) -> ComplexArray:
-    """Of a projection, M, C, K (r, r), along directions in its basis (r, m), at many frequencies, (F, m, m)."""
-    mass, damping, stiffness = small
+    """Of a projection, M, C, K, S (r, r), along directions in its basis (r, m), at many frequencies, (F, m, m)."""
+    mass, damping, stiffness, structural = small
     w = np.linspace(top / _COMPARED, top, _COMPARED)[:, None, None]
     columns = np.broadcast_to(seen.astype(complex), (len(w), *seen.shape))
-    return np.asarray(seen.T @ np.linalg.solve(stiffness - w**2 * mass + 1j * w * damping, columns), dtype=complex)
+    return np.asarray(
+        seen.T @ np.linalg.solve(stiffness - w**2 * mass + 1j * (w * damping + structural), columns), dtype=complex
+    )
 
 
 def _change(one: ComplexArray, other: ComplexArray) -> float:
@@ -277,8 +278,8 @@ def factorised(matrix: Any) -> Any:
 
 def exact_flexibility(system: System, directions: Array, frequency: float, values: Mapping[str, float]) -> ComplexArray:
     """The dynamic flexibility between directions (m, n) by a direct solution of the whole structure, (m, m)."""
-    mass, damping, stiffness = (m.sparse_value(values) for m in (system.mass, system.damping, system.stiffness))
-    matrix = stiffness - frequency**2 * mass + 1j * frequency * damping
+    mass, damping, stiffness, structural = (matrix.sparse_value(values) for matrix in system.linear_parts)
+    matrix = stiffness - frequency**2 * mass + 1j * (frequency * damping + structural)
     factors, columns = factorised(matrix), np.ascontiguousarray(directions.T.astype(complex))
     answers = factors.solve(columns)
     # without pivots off the diagonal digits may be lost: once more for what is left over

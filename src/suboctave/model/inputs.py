@@ -211,7 +211,7 @@ def _numbers(item: Any) -> Iterator[tuple[str, float]]:
     system = getattr(getattr(item, "orbit", item), "system", item)
     if isinstance(system, System):
         yield from system.parameters.items()
-        for matrix in (system.mass, system.damping, system.stiffness):
+        for matrix in system.linear_parts:
             value = matrix.compact(system.parameters)
             entries = value.data if matrix.sparse else value.ravel()
             yield from ((matrix.what, float(entry)) for entry in entries)

@@ -5,9 +5,9 @@ phase)` along the direction r of rigid translation (`x = r` moves all DOFs as th
 
 - in relative coordinates, `x` measured from the base: `M x'' + C x' + K x + f = -M r y''`. Elements between the
   structure and the ground are between structure and base: nothing else changes.
-- in absolute coordinates: `M x'' + C x' + K x = C r y' + K r y`, where stiffness and damping of the structure that hold
-  it to the ground (`K r`, `C r`) hold it to the base. An element that feels `r` would need the base's motion too; such
-  systems are written in relative coordinates.
+- in absolute coordinates: `M x'' + C x' + K x = C r y' + K r y`, where stiffness and damping, structural too, of the
+  structure that hold it to the ground (`K r`, `C r`) hold it to the base. An element that feels `r` would need the
+  base's motion too; such systems are written in relative coordinates.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ from suboctave.model.matrices import MatrixCoefficient
 
 #: far above what harmonic balance has unknowns for; angles of higher ones would lose digits in time integration
 _HIGHEST = 10_000
-#: mass, damping and stiffness of the structure that a load acts on
-Matrices = tuple[MatrixCoefficient, MatrixCoefficient, MatrixCoefficient]
+#: mass, damping, stiffness and structural damping of the structure that a load acts on
+Matrices = tuple[MatrixCoefficient, MatrixCoefficient, MatrixCoefficient, MatrixCoefficient]
 
 
 @dataclass(frozen=True, eq=False)
@@ -274,7 +274,7 @@ class _Base(_WithMatrices):
         self.harmonic = self._read_harmonic(harmonic, 1)
 
     def components(self, n: int, matrices: Matrices) -> Components:
-        mass, damping, stiffness = matrices
+        mass, damping, stiffness, structural = matrices
         k, phase, given = self.harmonic, self.phase, f"({self.amplitude.text})"
         frequency = f"({k}*omega)"
         if self.coordinates == "relative":
@@ -283,7 +283,8 @@ class _Base(_WithMatrices):
             return self._along(mass, n, amplitude, k, phase)
         # y' = k omega amplitude cos(.. + pi / 2); an acceleration has y = -y'' / (k omega)^2
         shown = f"-1.0 * {given} / {frequency}**2" if self._order == 0 else given
-        rate = self._along(damping, n, f"{shown} * {frequency}", k, coefficient(f"({phase.text}) + (pi/2)"))
+        ahead = coefficient(f"({phase.text}) + (pi/2)")
+        rate = self._along(damping, n, f"{shown} * {frequency}", k, ahead) + self._along(structural, n, shown, k, ahead)
         return self._along(stiffness, n, shown, k, phase) + rate
 
     def check_elements(self, n: int, elements: Sequence[Any]) -> None:

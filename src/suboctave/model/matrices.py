@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from suboctave.errors import InputError, NegativeDampingWarning, located
+from suboctave.lazy import lazy
 from suboctave.model.elements.base import Array
 from suboctave.model.expressions.coefficients import Coefficient, coefficient
 
@@ -25,6 +26,8 @@ _DENSE = 600
 _MOST_DENSE = 12000
 #: share of the largest eigenvalue of a damping below which a negative one is rounding
 _ROUNDING = 1e-9
+#: square of a natural frequency relative to the median below which a mode moves freely
+_FREE = 1e-10
 
 
 class MatrixCoefficient:
@@ -82,6 +85,26 @@ class MatrixCoefficient:
         )
         return MatrixCoefficient(base, list(zip(self.coefficients, patterns, strict=True)), self.what)
 
+    def zeros(self, what: str) -> MatrixCoefficient:
+        """A matrix of zeros of this size, dense or sparse as this one."""
+        import scipy.sparse
+
+        return MatrixCoefficient(
+            scipy.sparse.csr_array((self.n, self.n)) if self.sparse else 0.0 * self._base, (), what
+        )
+
+    def plus(self, matrix: Array) -> MatrixCoefficient:
+        """The sum with a matrix of numbers (n, n)."""
+        import scipy.sparse
+
+        more = scipy.sparse.csr_array(matrix) if self.sparse else matrix
+        return MatrixCoefficient(self._base + more, self._terms, self.what)
+
+    @lazy
+    def zero(self) -> bool:
+        """Whether it is zero at any values of the parameters."""
+        return not self._terms and not abs(self._base).max()
+
     @property
     def _patterns(self) -> tuple[Any, ...]:
         return tuple(pattern for _, pattern in self._terms)
@@ -132,7 +155,7 @@ def _constant(source: Any, what: str) -> Any:
         import scipy.sparse
 
         if np.iscomplexobj(source):
-            raise InputError(f"{what} has complex entries; an equation of motion in time needs real ones")
+            raise InputError(f"{what} has complex entries: give the imaginary part of a stiffness as structural=")
         matrix = scipy.sparse.csr_array(source, dtype=float)
         entries = matrix.data
     else:
@@ -203,6 +226,26 @@ def _added(like: Any, terms: Sequence[tuple[Coefficient, Any]], what: str) -> Ma
     return MatrixCoefficient(base, [(c, matrix) for c, matrix in terms if not c.constant], what)
 
 
+def viscous_damping(mass: Array, stiffness: Array, structural: Array) -> Array:
+    """The viscous damping that stands in for a structural one S, all (n, n):
+
+        C = M Phi diag(w)^-1/2 (Phi^T S Phi) diag(w)^-1/2 Phi^T M,        K Phi = M Phi diag(w^2),  Phi^T M Phi = 1.
+
+    It takes from every mode at its own frequency w what S takes, and nothing from rigid-body modes.
+    """
+    from scipy.linalg import eigh
+
+    if not structural.any():
+        return np.zeros_like(structural)
+    values, modes = eigh(0.5 * (stiffness + stiffness.T), 0.5 * (mass + mass.T))
+    moving = values > _FREE * np.median(np.abs(values))
+    weight = np.where(moving, np.where(moving, values, 1.0) ** -0.25, 0.0)
+    momenta = mass @ modes
+    inside = weight[:, None] * (modes.T @ structural @ modes) * weight
+    result: Array = momenta @ inside @ momenta.T
+    return result
+
+
 # ------------------------------------------------------------------------------------------------------------ checks
 def check_mass(mass: Any) -> None:
     """Refuse a mass (n, n), dense or sparse, that is asymmetric, singular or indefinite.
@@ -271,18 +314,19 @@ def sparse_factors(matrix: Any) -> Any:
     return splu(columns, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
 
 
-def check_damping(damping: Any, mass_diagonal: Any) -> None:
-    """Warn (`NegativeDampingWarning`) of a damping (n, n), dense or sparse, that feeds energy into some motion."""
+def check_damping(matrix: MatrixCoefficient, values: Mapping[str, float], mass_diagonal: Any) -> None:
+    """Warn (`NegativeDampingWarning`) of a damping that feeds energy into some motion."""
+    damping = matrix.compact(values)
     scale = 1.0 / np.sqrt(np.asarray(mass_diagonal, dtype=float))
     if damping.shape[0] > _DENSE:
-        values = np.asarray(damping.diagonal(), dtype=float) * scale**2
+        rates = np.asarray(damping.diagonal(), dtype=float) * scale**2
     else:
         dense = damping if isinstance(damping, np.ndarray) else damping.toarray()
         with np.errstate(over="ignore", invalid="ignore"):
             scaled = 0.5 * (dense + dense.T) * scale[:, None] * scale
-        values = np.linalg.eigvalsh(scaled) if np.isfinite(scaled).all() else np.zeros(1)
-    if values.min() < -_ROUNDING * np.abs(values).max():
-        warn_of_negative("the damping matrix feeds energy into some motions")
+        rates = np.linalg.eigvalsh(scaled) if np.isfinite(scaled).all() else np.zeros(1)
+    if rates.min() < -_ROUNDING * np.abs(rates).max():
+        warn_of_negative(f"the {matrix.what} matrix feeds energy into some motions")
 
 
 def warn_of_negative(what: str) -> None:

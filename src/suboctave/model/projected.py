@@ -63,10 +63,7 @@ class ProjectedSystem(System):
     @property
     def words(self) -> str:
         """What a result rests on."""
-        return (
-            f"Projected: {self.structure.n} degrees of freedom in {self.n} modes, for frequencies up to "
-            f"{self.covers:.6g}; error of the flexibility there {self.error:.1e}"
-        )
+        return projected_words(self.structure.n, self.n, self.covers, self.error)
 
     def coordinate(self, dof: int) -> int:
         """Which coordinate is the displacement of a degree of freedom of the structure."""
@@ -115,6 +112,14 @@ class ProjectedSystem(System):
         return project, (self.structure, self.shapes, self.read, self.watched, self.covers, self.error)
 
 
+def projected_words(n: int, modes: int, covers: float, error: float) -> str:
+    """What a structure in a basis is, in a sentence."""
+    return (
+        f"Projected: {n} degrees of freedom in {modes} modes, for frequencies up to {covers:.6g}; "
+        f"error of the flexibility there {error:.1e}"
+    )
+
+
 def project(
     structure: System,
     shapes: Array,
@@ -130,7 +135,7 @@ def project(
     """
     seen = _Seen(shapes, len(read))
     parts: dict[str, Any] = {
-        what: getattr(structure, what).projected(shapes) for what in ("mass", "damping", "stiffness")
+        what: getattr(structure, what).projected(shapes) for what in ("mass", "damping", "stiffness", "structural")
     }
     loads = [
         HarmonicLoad(amplitude=c.amplitude.text, harmonic=c.harmonic, phase=c.phase.text, direction=seen(c.direction))

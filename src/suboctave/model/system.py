@@ -1,4 +1,7 @@
-"""What vibrates: `M x'' + C x' + K x + sum_e d_e f_e(d_e.x, d_e.x'; parameters) = p(t)`."""
+"""What vibrates: `M x'' + C x' + K x + sum_e d_e f_e(d_e.x, d_e.x'; parameters) = p(t)`.
+
+Structural (hysteretic) damping adds to every harmonic of a motion the force `i S x`, whatever its frequency.
+"""
 
 from __future__ import annotations
 
@@ -19,9 +22,9 @@ from suboctave.model.elements.smoothness import CornerSampling, PiecewiseLinear,
 from suboctave.model.expressions.coefficients import Coefficient
 from suboctave.model.expressions.reader import RESERVED
 from suboctave.model.loads import HarmonicLoad, Load, LoadComponent
-from suboctave.model.matrices import MatrixCoefficient, check_damping, check_mass, matrix_coefficient
+from suboctave.model.matrices import MatrixCoefficient, check_damping, check_mass, matrix_coefficient, viscous_damping
 
-_MATRICES = ("mass", "damping", "stiffness")
+_MATRICES = ("mass", "damping", "stiffness", "structural")
 _PARTS = (*_MATRICES, "elements", "loads", "parameters", "name", "dof_names")
 
 
@@ -30,10 +33,12 @@ class System:
 
     `mass`, `damping`, `stiffness`: a number or an expression (one degree of freedom), nested lists or arrays (n, n) of
     numbers and expressions, sparse matrices, or `{expression: matrix}` for a sum; the mass symmetric positive definite
-    at the parameters, the other two of any kind. `elements`: a sequence of `Element`; their forces stand on the
-    left-hand side (those that are integrated at nodes of their own come last). `loads`: a sequence of `HarmonicLoad`
-    and other loads, on the right-hand side. `parameters`: `{name: number}`, every one of them used somewhere.
-    `dof_names`: names for messages. Units are the user's own, if they are consistent; frequencies are circular.
+    at the parameters, the other two of any kind. `elements`: a sequence of `Element`; their forces stand on the left-
+    hand side (those that are integrated at nodes of their own come last). `loads`: a sequence of `HarmonicLoad` and
+    other loads, on the right-hand side. `parameters`: `{name: number}`, every one of them used somewhere.
+    `structural`: structural damping S, a force `i S x` at every frequency: like the other matrices, `{"eta": K}` for a
+    loss factor. `dof_names`: names for messages. Units are the user's own, if they are consistent; frequencies are
+    circular.
 
     Raises `InputError` for anything that does not fit, before any work.
     """
@@ -41,6 +46,7 @@ class System:
     mass: MatrixCoefficient
     damping: MatrixCoefficient
     stiffness: MatrixCoefficient
+    structural: MatrixCoefficient
     elements: tuple[BaseElement, ...]
     loads: tuple[Load, ...]
     parameters: Mapping[str, float]
@@ -59,6 +65,7 @@ class System:
         parameters: Mapping[str, float] | None = None,
         name: str = "",
         dof_names: Iterable[str] = (),
+        structural: Any = None,
     ) -> None:
         read = matrix_coefficient(mass, None, "mass")
         self._fill(
@@ -66,6 +73,9 @@ class System:
             mass=read,
             damping=matrix_coefficient(damping, read.n, "damping"),
             stiffness=matrix_coefficient(stiffness, read.n, "stiffness"),
+            structural=read.zeros("structural")
+            if structural is None
+            else matrix_coefficient(structural, read.n, "structural"),
             elements=sorted(_several(elements, BaseElement, "Element", "elements"), key=lambda e: e.own_nodes),
             loads=_several(loads, Load, "HarmonicLoad", "loads"),
             parameters=_read_parameters(parameters),
@@ -158,7 +168,7 @@ class System:
 
     def expressions(self) -> Iterator[tuple[str, Coefficient, Key]]:
         """Every expression: where it stands, itself, and the key of the part of the system that it belongs to."""
-        for matrix in (self.mass, self.damping, self.stiffness):
+        for matrix in self.linear_parts:
             for source in matrix.coefficients:
                 yield matrix.what, source, (matrix.what,)
         for i, element in enumerate(self.elements):
@@ -214,9 +224,29 @@ class System:
             with located("mass"):
                 check_mass(mass)
         if first:
-            check_damping(self.damping.compact(self.parameters), mass.diagonal())
+            for matrix in (self.damping, self.structural):
+                check_damping(matrix, self.parameters, mass.diagonal())
 
     # --------------------------------------------------------------------------------------------------- matrices
+    @property
+    def linear_parts(self) -> tuple[MatrixCoefficient, MatrixCoefficient, MatrixCoefficient, MatrixCoefficient]:
+        """M, C, K and the structural damping S."""
+        return self.mass, self.damping, self.stiffness, self.structural
+
+    def viscous_equivalent(self) -> System:
+        """The same system with viscous damping in the place of the structural one, at these parameters.
+
+        A mode of the linear structure, of the natural frequency w, is damped as much at w: by half its loss factor. At
+        other frequencies it is not, so that this is another system, but one that has an equation of motion in time.
+        """
+        if self.structural.zero:
+            return self
+        mass, _, stiffness = self.matrices()
+        more = viscous_damping(mass, stiffness, self.structural.value(self.parameters))
+        result = self._changed(damping=self.damping.plus(more), structural=self.mass.zeros("structural"))
+        used = {name for _, source, _ in result.expressions() for name in source.names}
+        return result._changed(parameters={name: v for name, v in self.parameters.items() if name in used})
+
     def matrices(self, values: Mapping[str, float] | None = None) -> tuple[Array, Array, Array]:
         """`(M, C, K)` as dense arrays (n, n), at `values` (all parameters; default: the system's own)."""
         at = self.parameters if values is None else values
@@ -380,7 +410,11 @@ def build(
     Raises InputError where the description is not one, or names a class that is not known (see `allow_code` above).
     """
     try:
-        parts: dict[str, Any] = {what: _read_matrix(description[what], what, arrays or {}) for what in _MATRICES}
+        parts: dict[str, Any] = {
+            what: _read_matrix(description[what], what, arrays or {}) for what in _MATRICES if what in description
+        }
+        # files from before there was structural damping have none
+        parts.setdefault("structural", parts["mass"].zeros("structural"))
         for family in ("element", "load"):
             items = description[f"{family}s"]
             parts[f"{family}s"] = [build_part(item, family, arrays or {}, allow_code) for item in items]

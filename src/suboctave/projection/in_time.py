@@ -14,6 +14,7 @@ from itertools import product
 
 import numpy as np
 
+from suboctave.errors import InputError
 from suboctave.harmonic.basis import Array
 from suboctave.harmonic.condensed import Condensed, acting, independent, linear_part_of
 from suboctave.harmonic.linear_part import LinearPart
@@ -40,10 +41,11 @@ def small_system(
     varied
         Values of parameters between which those of the computation lie, by name.
     """
+    _check_equation(system)
     if system.n <= COMPLETE:
         return system
     linear = linear_part_of(system, None, (HARMONICS + 0.5) * omega, None, watched)
-    inside = system.mass.names | system.damping.names | system.stiffness.names
+    inside = frozenset[str]().union(*(matrix.names for matrix in system.linear_parts))
     names = [name for name in varied or {} if name in inside]
     for values in product(*((varied or {})[name] for name in names)) if names else ():
         # the basis grows by what it needs there, and keeps what it has
@@ -58,6 +60,7 @@ def system_of_motions(motions: Sequence[PeriodicOrbit]) -> System:
     motion, and how far that is from the whole structure is what the error of the projection says.
     """
     first = motions[0]
+    _check_equation(first.system)
     if first.system.n <= COMPLETE:
         return first.system
     linear = first.state().linear
@@ -69,6 +72,7 @@ def system_of_motions(motions: Sequence[PeriodicOrbit]) -> System:
 
 def in_basis(system: System, linear: LinearPart, watched: Sequence[int]) -> System:
     """A system in the basis of its linear part, or itself where that has none of its own."""
+    _check_equation(system)
     if not isinstance(linear, Condensed) or linear.projected.shapes is None:
         return system
     shapes, dofs = linear.projected.shapes, list(dict.fromkeys(int(dof) for dof in watched))
@@ -77,3 +81,11 @@ def in_basis(system: System, linear: LinearPart, watched: Sequence[int]) -> Syst
     mass, _, stiffness = linear.equation_of_motion()
     basis = coordinates_along(shapes, read, (mass, stiffness), dofs)
     return project(system, basis, read, dofs, linear.covers, linear.error)
+
+
+def _check_equation(system: System) -> None:
+    if not system.structural.zero:
+        raise InputError(
+            "structural damping has no equation of motion in time: system.viscous_equivalent() is a system that has "
+            "one, with as much damping of each mode at its own frequency"
+        )

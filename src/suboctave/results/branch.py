@@ -150,6 +150,16 @@ class Branch(CurveTables, BranchReadings):
         return self.points[0].orbit.basis.nu if self.points else 1
 
     @property
+    def basis(self) -> tuple[str, ...]:
+        """What its motions rest on, in sentences: the projection of a large structure and its error, structural
+        damping. Empty where its matrices are taken as they are.
+        """
+        parts = {id(p.orbit.balance.linear): p.orbit.balance.linear for p in self.points}
+        # of those that have grown from each other, the one for the highest frequencies
+        widest = max(parts.values(), key=lambda part: getattr(part, "covers", 0.0), default=None)
+        return () if widest is None else widest.words
+
+    @property
     def junctions(self) -> list[tuple[Junction, PeriodicOrbit]]:
         """Where it leaves or meets another branch, each with its own motion right beside."""
         ends = ((self.departs, 0), (self.arrives, -1))
@@ -309,7 +319,7 @@ class Branch(CurveTables, BranchReadings):
 
     def __repr__(self) -> str:
         notes = (f"  note: {warning}" for warning in self.warnings)
-        return "\n".join([self._head, *notes, repr(self.bifurcations)])
+        return "\n".join([self._head, *(f"  {words}" for words in self.basis), *notes, repr(self.bifurcations)])
 
 
 # ----------------------------------------------------------------------------------------------- curves of bifurcations

@@ -388,11 +388,11 @@ def ground_and_load(orbit: PeriodicOrbit, r: Array) -> tuple[ComplexArray, Compl
     state, balance = orbit.state(), orbit.balance
     frequencies, linear = orbit.basis.multiples * orbit.omega, state.linear
     motion = linear.recovered(frequencies, to_complex(orbit.x))
-    damping, stiffness = (
-        motion @ linear.seen(r @ part.compact(orbit.values))
-        for part in (balance.system.damping, balance.system.stiffness)
+    damping, stiffness, structural = (
+        motion @ linear.seen(r @ part.compact(orbit.values)) for part in balance.system.linear_parts[1:]
     )
-    held, along = stiffness + 1j * frequencies * damping, linear.read(r)
+    held = stiffness + 1j * (frequencies * damping + np.sign(frequencies) * structural)
+    along = linear.read(r)
     return held + to_complex(state.force) @ along, to_complex(balance.load(orbit.values, orbit.omega)) @ along
 
 

@@ -29,11 +29,11 @@ def read_abaqus(path: Path) -> Contents:
 
 
 def companions(path: Path) -> dict[str, Path]:
-    """The files of the same job, by what they are, where the name is Abaqus' own: job_STIF1.mtx, MASS1, DMPV1."""
+    """The files of the same job, by what they are, where the name is Abaqus' own: job_STIF1.mtx and the like."""
     stem = path.name
-    for part, what in (("_STIF", "stiffness"), ("_MASS", "mass"), ("_DMPV", "damping")):
+    parts = {"stiffness": "_STIF", "mass": "_MASS", "damping": "_DMPV", "structural": "_DMPS"}
+    for what, part in parts.items():
         if part in stem:
-            others = {"stiffness": "_STIF", "mass": "_MASS", "damping": "_DMPV"}
-            found = {role: path.with_name(stem.replace(part, other)) for role, other in others.items()}
+            found = {role: path.with_name(stem.replace(part, other)) for role, other in parts.items()}
             return {role: file for role, file in found.items() if file.is_file() or role in (what, "mass", "stiffness")}
     return {}

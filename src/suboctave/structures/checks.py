@@ -31,8 +31,8 @@ def square_matrix(given: Any, what: str, n: int | None = None) -> Any:
             raise InputError(f"the {what} must be a matrix of numbers, not {kind}", (what,))
     if np.iscomplexobj(given):
         raise InputError(
-            f"the {what} is complex: structural (hysteretic) damping has no equation in time. Give the real part, and "
-            "viscous damping as damping=",
+            f"the {what} is complex: give its real part, and structural (hysteretic) damping, the imaginary part of a "
+            "stiffness, as structural=",
             (what,),
         )
     _check_places(given, what)

@@ -1,7 +1,7 @@
 """What a file holds: matrices by their names, labels of degrees of freedom; and which matrix is the mass.
 
 Matrices are recognised by their names, in any case: M, mass, MGG, MAA and the like; K, stiffness, KGG, KAA; C, D,
-damping, BGG, BAA. Where several could be meant, a reader is told to choose.
+damping, BGG, BAA; structural, K4, K4GG, K4AA. Where several could be meant, a reader is told to choose.
 """
 
 from __future__ import annotations
@@ -16,13 +16,16 @@ from suboctave.errors import InputError, suggest
 from suboctave.structures.triplets import LabelledEntries
 
 #: what the matrices are, in the order of the constructor of a structure
-ROLES = ("mass", "stiffness", "damping")
+ROLES = ("mass", "stiffness", "damping", "structural")
+#: those that a structure may have none of
+OPTIONAL = ("damping", "structural")
 _NAMES = {
     "mass": {"m", "mgg", "maa", "mll", "mff", "mhh", "maax", "mggx"},
     "stiffness": {"k", "kgg", "kaa", "kll", "kff", "khh", "kaax", "kggx"},
     "damping": {"c", "d", "bgg", "baa", "bll", "bff", "bhh", "baax", "bggx"},
+    "structural": {"k4", "k4gg", "k4aa", "k4ll", "k4ff", "k4hh", "k4aax", "k4ggx"},
 }
-_BEGINNINGS = {"mass": ("mass",), "stiffness": ("stif",), "damping": ("damp",)}
+_BEGINNINGS = {"mass": ("mass",), "stiffness": ("stif",), "damping": ("damp",), "structural": ("struct",)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +46,7 @@ def chosen(matrices: Mapping[str, Any], names: Mapping[str, str | None], file: s
 
 
 def matrix_of(matrices: Mapping[str, Any], what: str, name: str | None, file: str) -> Any:
-    """The mass, stiffness or damping (`what`) among the matrices of a file; None for a damping that is not there."""
+    """The mass, stiffness or a damping (`what`) among the matrices of a file; None for a damping that is not there."""
     if name is not None:
         if name not in matrices:
             raise InputError(f"{file} holds no matrix {name!r}{suggest(name, matrices)}", (what,))
@@ -54,7 +57,7 @@ def matrix_of(matrices: Mapping[str, Any], what: str, name: str | None, file: st
         raise InputError(f"{file} holds several that may be the {what}, {', '.join(candidates)}: {how}", (what,))
     if candidates:
         return matrices[candidates[0]]
-    if what == "damping":
+    if what in OPTIONAL:
         return None
     if set(matrices) == {""}:
         raise InputError(f"{file} holds one matrix: give a file for each, mass= and stiffness=, and no other", (what,))

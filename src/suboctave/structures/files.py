@@ -46,16 +46,17 @@ def read_structure(
     dofs: Any = None,
     mesh: Mesh | None = None,
     name: str | None = None,
+    structural: Any = None,
 ) -> Structure:
     """A structure from one file with all matrices, or from one file for each.
 
     path
         The file with all of them: .npz, .mat, .h5, .op4, .op2, .pch, one of CalculiX' .sti, .mas and .dof, or one of
         Abaqus' job_STIF1.mtx and job_MASS1.mtx.
-    stiffness, mass, damping
-        With `path`, the names of the matrices in it, where those are not M, K, C and the like. Without, a file each:
-        .mtx (Matrix Market, Abaqus), .npz, .npy, .mat, .h5, .op4, .pch. `damping` may be `Rayleigh`, `ModalDamping`
-        or a matrix also.
+    stiffness, mass, damping, structural
+        With `path`, the names of the matrices in it, where those are not M, K, C, K4 and the like. Without, a file
+        each: .mtx (Matrix Market, Abaqus), .npz, .npy, .mat, .h5, .op4, .pch. `damping` may be `Rayleigh`,
+        `ModalDamping` or a matrix also, `structural` a loss factor (a number) or a matrix.
     dofs
         Labels: a `DofMap`, pairs (node, direction), or a text file with node and direction in each line. Where the
         files have labels, these say in which order they are.
@@ -64,7 +65,7 @@ def read_structure(
 
     Raises `InputError` for files that cannot be read, with what is wrong in one line.
     """
-    given: dict[str, Any] = {"stiffness": stiffness, "mass": mass, "damping": damping}
+    given: dict[str, Any] = {"stiffness": stiffness, "mass": mass, "damping": damping, "structural": structural}
     in_files = {what: value for what, value in given.items() if isinstance(value, str | PathLike)}
     labels = _labels(dofs)
     more: dict[str, Any] = {}
@@ -90,8 +91,7 @@ def read_structure(
             contents = _contents(first)
             found = chosen(contents.matrices, {what: str(value) for what, value in in_files.items()}, first.name)
             more, files = dict(contents.more), dict.fromkeys(found, first)
-    if damping is not None and not isinstance(damping, str | PathLike):
-        found["damping"] = damping
+    found |= {what: value for what, value in given.items() if value is not None and what not in in_files}
     file_names = {what: file.name for what, file in files.items()}
     if any(isinstance(matrix, LabelledEntries) for matrix in found.values()):
         found, more["dofs"] = _labelled(found, file_names, labels)

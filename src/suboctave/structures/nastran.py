@@ -135,7 +135,7 @@ def _check_header(name: str, fields: list[str], file: str) -> None:
     if form not in _FORMS:
         raise InputError(f"{file}: {name} is a matrix of form {form}; square (1) and symmetric (6) ones are read")
     if kind > 2:
-        raise InputError(f"{file}: {name} is complex; an equation of motion in time needs real matrices")
+        raise InputError(f"{file}: {name} is complex: punch its real part, and K4 for structural damping")
 
 
 def _groups(fields: list[str]) -> Iterator[tuple[int, int, float]]:

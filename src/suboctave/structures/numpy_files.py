@@ -4,6 +4,7 @@ An .npz is one sparse matrix as SciPy writes it, or an archive of arrays: dense 
 `NAME_data`, `NAME_indices`, `NAME_indptr`, `NAME_shape` (compressed rows). `write` makes such an archive, with
 
     mass, stiffness, damping    sparse, damping as `rayleigh` (two numbers or expressions) or `modal` (ratios) also
+    structural                  sparse, or `loss_factor`, a number or an expression
     dof_nodes, dof_directions   labels, texts (n,); fixed_nodes, fixed_directions
     points, point_nodes         of the mesh; cells_KIND
     name
@@ -17,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from suboctave.model.expressions.coefficients import Coefficient
 from suboctave.structures.contents import Contents, compressed, labels_of
 from suboctave.structures.damping import ModalDamping, Rayleigh
 from suboctave.structures.dof_map import DofMap
@@ -55,6 +57,8 @@ def _more(arrays: Mapping[str, Any]) -> dict[str, Any]:
     if "modal_ratio" in arrays:
         ratio, count = arrays["modal_ratio"].tolist()
         more["damping"] = ModalDamping(ratio, int(count) or None)
+    if "loss_factor" in arrays:
+        more["structural"] = str(arrays["loss_factor"])
     if "points" in arrays:
         cells = {name.removeprefix("cells_"): array for name, array in arrays.items() if name.startswith("cells_")}
         nodes = arrays["point_nodes"].tolist() if "point_nodes" in arrays else None
@@ -70,9 +74,15 @@ def read_npy(path: Path) -> Contents:
 
 
 def write(
-    path: Path, matrices: Mapping[str, Any], dofs: DofMap | None, mesh: Mesh | None, damping: Any, name: str
+    path: Path,
+    matrices: Mapping[str, Any],
+    dofs: DofMap | None,
+    mesh: Mesh | None,
+    damping: Any,
+    structural: Any,
+    name: str,
 ) -> None:
-    """Write an archive; `damping`: `Rayleigh` or `ModalDamping`, where it is no matrix."""
+    """Write an archive; `damping`: `Rayleigh` or `ModalDamping`, `structural`: a loss factor, where no matrices."""
     arrays: dict[str, Any] = {"name": np.array(name)}
     for what, matrix in matrices.items():
         values = (matrix.data, matrix.indices, matrix.indptr, np.array(matrix.shape))
@@ -83,6 +93,8 @@ def write(
         single = not isinstance(damping.ratios, tuple)
         ratios: Any = [damping.ratios, damping.count or 0] if single else damping.ratios
         arrays["modal_ratio" if single else "modal"] = np.array(ratios, dtype=float)
+    if isinstance(structural, Coefficient):
+        arrays["loss_factor"] = np.array(structural.text)
     if dofs is not None:
         for kind, labels in (("dof", dofs.labels), ("fixed", sorted(dofs.fixed, key=str))):
             for part, column in (("nodes", 0), ("directions", 1)):

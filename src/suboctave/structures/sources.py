@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from suboctave.errors import InputError, check_numbers, shortened, suggest
 from suboctave.model.elements.base import Array
+from suboctave.model.expressions.coefficients import Coefficient
 from suboctave.structures.damping import ModalDamping, Rayleigh
 from suboctave.structures.dof_map import DofMap, Label
 from suboctave.structures.mesh import Mesh
@@ -196,7 +197,8 @@ def join(*structures: Structure, names: Sequence[str] = (), places: ArrayLike | 
         labels += [(f"{name}:{node}", direction) for node, direction in one.dofs.labels]
     mass, stiffness = (block_diag([getattr(one, what) for one in structures]) for what in ("mass", "stiffness"))
     mesh = _joined_mesh(structures, called, places)
-    return Structure(mass, stiffness, _joined_damping(structures), DofMap(labels), mesh, " and ".join(called))
+    damping, structural = _joined_damping(structures), _joined_losses(structures)
+    return Structure(mass, stiffness, damping, DofMap(labels), mesh, " and ".join(called), structural)
 
 
 def _joined_damping(structures: Sequence[Structure]) -> Any:
@@ -214,6 +216,18 @@ def _joined_damping(structures: Sequence[Structure]) -> Any:
                 raise InputError(f"the damping of {one.name!r} has parameters: give damping to the joined structure")
         blocks.append(0.0 * one.mass if damping is None else damping)
     return block_diag(blocks)
+
+
+def _joined_losses(structures: Sequence[Structure]) -> Any:
+    from scipy.sparse import block_diag
+
+    first = structures[0].structural
+    if (first is None or isinstance(first, Coefficient)) and all(one.structural == first for one in structures[1:]):
+        return None if first is None else first.text
+    blocks = [one.losses() for one in structures]
+    if any(isinstance(block, Mapping) for block in blocks):
+        raise InputError("a loss factor has parameters: give structural= to the system of the joined structure")
+    return block_diag([0.0 * one.mass if own is None else own for one, own in zip(structures, blocks, strict=True)])
 
 
 def _joined_mesh(structures: Sequence[Structure], names: Sequence[str], places: ArrayLike | None) -> Mesh | None:

@@ -12,6 +12,7 @@ import numpy as np
 
 from suboctave.errors import InputError, located, path_of, shortened
 from suboctave.model.elements.base import Array, BaseElement
+from suboctave.model.expressions.coefficients import Coefficient, named_coefficient
 from suboctave.model.loads import Load
 from suboctave.model.system import System
 from suboctave.structures.checks import inertia_checked, square_matrix, symmetric_matrix
@@ -31,6 +32,9 @@ class Structure:
         (`massless`), and have to be fixed before the structure vibrates.
     damping
         A matrix (n, n), or `Rayleigh`, or `ModalDamping`; none by default.
+    structural
+        Structural (hysteretic) damping: a loss factor eta, a number or an expression in parameters, for `eta` times
+        the stiffness; or a matrix (n, n), such as Nastran's K4 or the imaginary part of a complex stiffness.
     dofs
         A `DofMap`, or n pairs (node, direction); without one, degrees of freedom are numbers from 0.
     mesh
@@ -46,6 +50,7 @@ class Structure:
     dofs: DofMap | None = None
     mesh: Mesh | None = None
     name: str = ""
+    structural: Any = None
 
     def __post_init__(self) -> None:
         labels: Any = self.dofs
@@ -63,7 +68,13 @@ class Structure:
             raise InputError(f"mesh must be a Mesh, not {shortened(self.mesh)}", ("mesh",))
         stiffness = symmetric_matrix(square_matrix(self.stiffness, "stiffness", n), "stiffness", labels)
         mass = inertia_checked(symmetric_matrix(mass, "mass", labels), labels)
+        structural = self.structural
+        if structural is not None and np.ndim(structural) == 0 and not hasattr(structural, "tocsr"):
+            structural = named_coefficient(structural, "Structure", "structural")
+        elif structural is not None:
+            structural = symmetric_matrix(square_matrix(structural, "structural", n), "structural", labels)
         read = {"mass": mass, "stiffness": stiffness, "damping": damping, "dofs": labels, "name": str(self.name)}
+        read["structural"] = structural
         for field, value in read.items():
             object.__setattr__(self, field, value)
 
@@ -112,6 +123,8 @@ class Structure:
         cut = {what: getattr(self, what)[kept][:, kept] for what in ("mass", "stiffness")}
         if not isinstance(self.damping, Rayleigh | ModalDamping | None):
             cut["damping"] = self.damping[kept][:, kept]
+        if not isinstance(self.structural, Coefficient | None):
+            cut["structural"] = self.structural[kept][:, kept]
         return replace(self, **cut, dofs=None if self.dofs is None else self.dofs.without(gone))
 
     def _places(self, item: Any) -> Sequence[int]:
@@ -145,15 +158,19 @@ class Structure:
         parameters: Mapping[str, float] | None = None,
         damping: Any = None,
         name: str = "",
+        structural: Any = None,
     ) -> System:
         """The structure with nonlinear elements and loads at its degrees of freedom.
 
         `damping`: in the place of its own, a matrix, `Rayleigh` (its numbers may be expressions in parameters) or
-        `ModalDamping`. The other arguments are those of `System`; names of DOFs are the labels, "1042 z".
+        `ModalDamping`; `structural` likewise, a loss factor (a number or an expression) or a matrix. The other
+        arguments are those of `System`; names of DOFs are the labels, "1042 z".
         """
-        structure = self if damping is None else self.with_damping(damping)
+        given = {"damping": damping, "structural": structural}
+        structure = replace(self, **{what: value for what, value in given.items() if value is not None})
         names = () if self.dofs is None else self.dofs.names
-        return System(*structure.matrices(), elements, loads, parameters, name or self.name, names)
+        matrices, losses = structure.matrices(), structure.losses()
+        return System(*matrices, elements, loads, parameters, name or self.name, names, losses)
 
     def matrices(self) -> tuple[Any, Any, Any]:
         """`(M, C, K)` as a `System` takes them; zeros without damping, `{expression: matrix}` where it has parameters.
@@ -171,6 +188,15 @@ class Structure:
             damping = damping.matrix(self.mass, self.stiffness)
         return self.mass, 0.0 * self.mass if damping is None else damping, self.stiffness
 
+    def losses(self) -> Any:
+        """The matrix of structural damping as a `System` takes it: `{expression: stiffness}` for a loss factor with
+        parameters; None without.
+        """
+        eta = self.structural
+        if not isinstance(eta, Coefficient):
+            return eta
+        return eta.value({}) * self.stiffness if eta.constant else {eta.text: self.stiffness}
+
     def save(self, path: str | PathLike[str]) -> None:
         """Write it to an .npz, which `read_structure` reads; the layout is in `structures/numpy_files.py`."""
         file = path_of(path)
@@ -179,7 +205,9 @@ class Structure:
         matrices = {"mass": self.mass, "stiffness": self.stiffness}
         if not isinstance(self.damping, Rayleigh | ModalDamping | None):
             matrices["damping"] = self.damping
-        write(file, matrices, self.dofs, self.mesh, self.damping, self.name)
+        if not isinstance(self.structural, Coefficient | None):
+            matrices["structural"] = self.structural
+        write(file, matrices, self.dofs, self.mesh, self.damping, self.structural, self.name)
 
     def __repr__(self) -> str:
         title = f"Structure {self.name!r}" if self.name else "Structure"
@@ -191,6 +219,11 @@ class Structure:
         if damping is not None:
             kept = isinstance(damping, Rayleigh | ModalDamping)
             lines.append(f"  damping    {damping if kept else f'{damping.nnz} nonzeros'}")
+        eta = self.structural
+        if eta is not None:
+            lines.append(
+                f"  structural {f'loss factor {eta.text}' if isinstance(eta, Coefficient) else f'{eta.nnz} nonzeros'}"
+            )
         if self.massless:
             lines.append(f"  no inertia {shown_dofs(self.massless, self.dofs)}")
         if self.mesh is not None:

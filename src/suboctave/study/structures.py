@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,8 +25,9 @@ from suboctave.structures.structure import Structure
 
 #: what makes a structure without any file
 SOURCES: dict[str, Callable[..., Structure]] = {"beam": beam, "plate": plate}
-_KEYS = ("file", "mass", "stiffness", "damping", "dofs", "fixed")
+_KEYS = ("file", "mass", "stiffness", "damping", "structural", "dofs", "fixed")
 _DAMPINGS = ("rayleigh", "ratios", "modal")
+_LOSSES = "a table { loss_factor = number or expression }"
 
 
 def given_structure(value: Any, folder: Path) -> Structure:
@@ -35,7 +36,8 @@ def given_structure(value: Any, folder: Path) -> Structure:
     `{ source = "beam" }` or "plate", with the arguments of these functions, needs no file.
 
     `damping` is the name of a matrix, a file, or one of the tables `{ rayleigh = [alpha, beta] }`,
-    `{ ratios = [[omega1, zeta1], [omega2, zeta2]] }`, `{ modal = ratio or ratios }`. Raises InputError, with the key.
+    `{ ratios = [[omega1, zeta1], [omega2, zeta2]] }`, `{ modal = ratio or ratios }`; `structural` the name of a matrix,
+    a file, or `{ loss_factor = number or expression }`. Raises InputError, with the key.
     """
     if isinstance(value, str):
         return read_structure(folder / value)
@@ -55,7 +57,12 @@ def given_structure(value: Any, folder: Path) -> Structure:
             given["damping"] = _damping(given["damping"])
     elif not isinstance(given.get("damping", ""), str):
         raise InputError(f"damping is a text or a table, not {shortened(given['damping'])}", ("damping",))
-    for what in ("mass", "stiffness", "damping") if file is None else ():
+    losses = given.get("structural")
+    if isinstance(losses, Mapping):
+        given["structural"] = _losses(losses)
+    elif not isinstance(losses, str | None):
+        raise InputError(f"structural is a text or {_LOSSES}, not {shortened(losses)}", ("structural",))
+    for what in ("mass", "stiffness", "damping", "structural") if file is None else ():
         if isinstance(given.get(what), str):
             given[what] = folder / given[what]
     if isinstance(given.get("dofs"), str):
@@ -67,18 +74,23 @@ def given_structure(value: Any, folder: Path) -> Structure:
 
 def _from_source(given: dict[str, Any]) -> Structure:
     source, fixed, damping = given.pop("source"), given.pop("fixed", ()), given.pop("damping", None)
+    losses = given.pop("structural", None)
     if source not in list(SOURCES):
         raise InputError(f"there is no source {shortened(source)}{suggest(str(source), SOURCES)}", ("source",))
     known = inspect.signature(SOURCES[source]).parameters
     for key in given:
         if key not in known:
-            raise InputError(f"a {source} has no argument {key!r}{suggest(key, [*known, 'damping', 'fixed'])}", (key,))
+            raise InputError(
+                f"a {source} has no argument {key!r}{suggest(key, [*known, 'damping', 'structural', 'fixed'])}", (key,)
+            )
     if missing := [name for name, one in known.items() if one.default is one.empty and name not in given]:
         raise InputError(f"a {source} needs {', '.join(missing)}")
     structure = SOURCES[source](**given)
     with located("damping"):
         if damping is not None:
             structure = structure.with_damping(_damping(damping))
+    if losses is not None:
+        structure = replace(structure, structural=_losses(losses))
     with located("fixed"):
         return structure.fixed(fixed) if fixed else structure
 
@@ -94,6 +106,12 @@ def _damping(given: Mapping[str, Any]) -> Rayleigh | ModalDamping:
         what = "alpha and beta" if kind == "rayleigh" else "[omega1, zeta1] and [omega2, zeta2]"
         raise InputError(f"{kind} is a list of two, {what}, not {shortened(value)}")
     return Rayleigh(*value) if kind == "rayleigh" else Rayleigh.from_ratios(*value)
+
+
+def _losses(given: Any) -> Any:
+    if not isinstance(given, Mapping) or list(given) != ["loss_factor"]:
+        raise InputError(f"structural is {_LOSSES}, not {shortened(given)}", ("structural",))
+    return given["loss_factor"]
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ from suboctave.structures.structure import Structure
 from suboctave.study.mistakes import Mistakes, Section
 from suboctave.study.structures import DofNames, given_structure
 
-MATRICES = ("mass", "damping", "stiffness")
+MATRICES = ("mass", "damping", "stiffness", "structural")
 SUFFIXES = (".npy", ".npz", ".mtx", ".mat", ".csv")
 
 
@@ -38,6 +38,7 @@ class SystemSection(Section):
     mass: Any = None
     damping: Any = None
     stiffness: Any = None
+    structural: Any = None
     elements: list[dict[str, Any]] = Field(default_factory=list)
     loads: list[dict[str, Any]] = Field(default_factory=list)
     parameters: dict[str, float] = Field(default_factory=dict)
@@ -89,9 +90,10 @@ def make_system(section: SystemSection, folder: Path, mistakes: Mistakes, allow_
     elements, loads = ([part for _, part in items] for items in placed.values())
     try:
         # in place of one that is wrong stands zero: what else is wrong is told all the same
-        mass, damping, stiffness = (matrices.get(what, 0.0) for what in MATRICES)
+        mass, damping, stiffness = (matrices.get(what, 0.0) for what in MATRICES[:3])
         title = section.name or (structure.name if structure is not None else "")
-        system = System(mass, damping, stiffness, elements, loads, section.parameters, title, dof_names)
+        losses = matrices.get("structural")
+        system = System(mass, damping, stiffness, elements, loads, section.parameters, title, dof_names, losses)
     except InputError as error:
         for part in error.parts:
             first, *rest = part.key or ("",)
@@ -122,8 +124,8 @@ def _of_structure(structure: Structure, mistakes: Mistakes) -> tuple[dict[str, A
     """The matrices of a structure, none where they make no system, and the names of its degrees of freedom."""
     matrices: dict[str, Any] = {}
     with mistakes.at("system", "structure"):
-        read = zip(MATRICES, structure.matrices(), strict=True)
-        matrices = {what: matrix_coefficient(matrix, structure.n, what) for what, matrix in read}
+        read = zip(MATRICES, (*structure.matrices(), structure.losses()), strict=True)
+        matrices = {what: matrix_coefficient(one, structure.n, what) for what, one in read if one is not None}
     return matrices, () if structure.dofs is None else structure.dofs.names
 
 
@@ -192,7 +194,8 @@ def _matrices(section: SystemSection, folder: Path, mistakes: Mistakes) -> dict[
     for what in MATRICES:
         value = getattr(section, what)
         if value is None:
-            mistakes.add(("system", what), "is missing")
+            if what != "structural":
+                mistakes.add(("system", what), "is missing")
             continue
         try:
             matrices[what] = matrix_coefficient(given_matrix(value, folder), size, what)
