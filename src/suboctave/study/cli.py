@@ -120,11 +120,24 @@ def run(
 
     read = read_study(study, allow_code)
     screen = console(quiet=json_wanted)
-    titles = [read.title] if read.title else []
+    kept: list[Any] = []  # of the whole run: analyses take it again
+
+    def head() -> None:
+        """Above the first analysis: what is refused before any work has no title."""
+        if kept:
+            return
+        if read.title:
+            screen.print(read.title, style="bold")
+        kept.append(read.linear_part())
+        if kept[0] is not None:
+            screen.print(str(kept[0]), soft_wrap=True)
+
+    def watch(step: Any) -> Any:
+        head()
+        return bar(step.name)
 
     def report(item: Finished) -> None:
-        while titles:  # above the first result: what is refused before any work has no title
-            screen.print(titles.pop(), style="bold")
+        head()
         if item.result is not None:
             note = ", taken from the earlier run" if item.reused else f" in {item.seconds:.2f} s"
             print_result(screen, item.step.name, item.result, note)
@@ -132,7 +145,7 @@ def run(
             screen.print(f"\n{item.step.name}", style="bold", end="")
             screen.print(f": failed. {item.failure}")
 
-    outcome = run_study(read, out, overwrite, resume, lambda step: bar(step.name), report, seconds)
+    outcome = run_study(read, out, overwrite, resume, watch, report, seconds)
     if outcome.complete is not None:
         screen.print(f"nothing to compute: {outcome.complete} is complete", soft_wrap=True)
     elif outcome.files:

@@ -12,9 +12,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from pydantic import Field, ValidationError
 
 from suboctave.errors import Key, path_of, suggest
+from suboctave.harmonic.condensed import condense
+from suboctave.harmonic.linear_part import LinearPart
 from suboctave.model.system import System, describe
 from suboctave.study.figures import FIGURES, Figure, StudyCurves
 from suboctave.study.mistakes import Lines, Mistake, Mistakes, Section, StudyError
@@ -83,6 +86,19 @@ class Study:
             }
             keys[step.name] = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
         return keys
+
+    def linear_part(self) -> LinearPart | None:
+        """What the first analysis takes for the structure, made before it: degrees of freedom, unknowns, natural
+        frequencies, modes and their error when it is printed. None for one degree of freedom.
+        """
+        for step in self.steps if self.system.n > 1 else ():
+            omega, harmonics = getattr(step, "omega", None), getattr(step, "harmonics", None)
+            if omega is not None:
+                observe = getattr(step, "observe", None)
+                kept = {"harmonics": harmonics} if isinstance(harmonics, int) else {}
+                system = self.system.with_parameters(step.parameters) if step.parameters else self.system
+                return condense(system, tuple(np.atleast_1d(omega)), **kept, observe=() if observe is None else observe)
+        return None
 
     @property
     def folder(self) -> Path:

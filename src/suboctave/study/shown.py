@@ -56,6 +56,8 @@ def _(branch: Branch, out: Console, note: str) -> None:
             line.append(f"{event.parameter(branch.name):.8g}")
         if event.contact is not None and event.kind == "grazing" and len(contacts) > 1:
             line[0] += f" {contacts[event.contact.element][0]}"
+    for words in branch.basis:
+        out.print(words, soft_wrap=True)
     print_events(out, lines, branch.name, [str(word) for word in dataset["event_criticality"].to_numpy()])
     for number, label in contacts.values() if len(contacts) > 1 else ():
         out.print(f"grazing {number}: {label}")

@@ -18,6 +18,7 @@ from suboctave.analysis.track import motion_kind, track
 from suboctave.bifurcation.bifurcation import CURVES_THROUGH
 from suboctave.continuation import Event
 from suboctave.errors import InputError, suggest
+from suboctave.harmonic.condensed import acting
 from suboctave.kinds import KINDS, TRACKED_KINDS
 from suboctave.model.description import from_plain
 from suboctave.model.inputs import check_bounds, check_range, check_system
@@ -89,8 +90,10 @@ class FollowingStep(Step):
         for key in ("max_step", "observe", "newton", "stepping", "stability", "events", "formulation"):
             beside = {"stepping": given.get("stepping")} if key == "max_step" else {}
             yield from tried(key, partial(settings_of, around.system, {key: given.get(key), **beside}))
-        if isinstance(self.harmonics, int) and (2 * self.harmonics + 1) * around.system.n > _MOST:
-            yield ("harmonics",), f"with {around.system.n} DOFs that is too many unknowns: keep fewer harmonics"
+        # displacements along which nothing acts are no unknowns
+        size = len(acting(around.system)) or around.system.n
+        if isinstance(self.harmonics, int) and (2 * self.harmonics + 1) * size > _MOST:
+            yield ("harmonics",), f"with forces along {size} DOFs that is too many unknowns: keep fewer harmonics"
 
 
 class CurveStep(FollowingStep, gives="branch"):
