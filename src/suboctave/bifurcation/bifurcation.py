@@ -13,8 +13,11 @@ from suboctave.bifurcation.gaps import GrazingContact
 from suboctave.bifurcation.normal_form import FORMS, NormalForm, normal_form
 from suboctave.errors import ConvergenceError, InputError, suggest
 from suboctave.floquet.result import FloquetResult
-from suboctave.harmonic.basis import ComplexArray
+from suboctave.harmonic.basis import Array, ComplexArray
+from suboctave.harmonic.linear_part import LinearPart
 from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.harmonic.perturbation import Kind
+from suboctave.harmonic.waves import Waves
 from suboctave.kinds import KINDS, TRACKED_KINDS
 from suboctave.lazy import lazy
 
@@ -32,6 +35,30 @@ def target_multiplier(kind: str, angle: float) -> complex | None:
     if row is None or not row.critical:
         return None
     return cmath.exp(1j * angle) if row.multiplier is None else complex(row.multiplier)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CriticalMotion:
+    """The perturbation of a motion that neither grows nor decays at a bifurcation, of any size.
+
+    frequencies
+        Circular frequencies of its waves, (F,), rad per unit time.
+    amplitudes
+        Complex amplitudes in the coordinates of the linear part's equation of motion, (F, N).
+    period
+        Of the perturbation: twice the motion's at a PD; at an NS, where it has none, the motion's.
+    """
+
+    frequencies: Array
+    amplitudes: ComplexArray
+    period: float
+    linear: LinearPart = field(repr=False)
+
+    def displacement(self, t: Array | float) -> Array:
+        """Displacements of all degrees of freedom at the times t; (n,) for a number, (n, len(t)) for an array."""
+        waves = np.exp(1j * np.multiply.outer(np.atleast_1d(np.asarray(t, dtype=float)), self.frequencies))
+        result = self.linear.shaped(np.real(waves @ self.amplitudes)).T
+        return result[:, 0] if np.ndim(t) == 0 else result
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,6 +146,21 @@ class Bifurcation:
     def criticality(self) -> str | None:
         """Whether it is "supercritical" or "subcritical"; None at limit points and where that is not certain."""
         return None if self.normal_form is None else self.normal_form.criticality
+
+    @property
+    def critical_motion(self) -> CriticalMotion | None:
+        """What is added to the motion where it bifurcates, the right null vector, as a motion; None where that is not
+        known: of contacts, of events, and of what could only be bracketed.
+        """
+        if self.kind not in FORMS or self.null_vectors is None:
+            return None
+        state, kind = self.orbit.state(), FORMS[self.kind][0]
+        vector = self.null_vectors.right * state.balance.row_weights(len(self.null_vectors.right))
+        waves = Waves.of(state, kind, vector, self.kappa)
+        frequencies = waves.at.values * state.rate
+        moving = state.linear.recovered(frequencies, waves.amplitudes)
+        period = self.orbit.period * (2 if kind is Kind.HALF else 1)
+        return CriticalMotion(frequencies, moving, period, state.linear)
 
     def with_normal_form(self, form: NormalForm | None) -> Bifurcation:
         """The same with a normal form that is known: it is not computed again."""

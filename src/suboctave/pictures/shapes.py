@@ -63,8 +63,8 @@ def plot_shape(
     structure
         With mesh and labels.
     field
-        Displacements (n,) of its degrees of freedom, in any unit; or a periodic motion, a point of a branch or a
-        bifurcation, drawn at the instant of the largest displacements.
+        Displacements (n,) of its degrees of freedom, in any unit; or a periodic motion, a point of a branch, a
+        bifurcation, or the `critical_motion` of one, drawn at the instant of the largest displacements.
     path
         Where the figure is saved: .png, .svg or .pdf.
     """
@@ -90,7 +90,7 @@ def animate_shape(
         With mesh and labels.
     snapshots
         Displacements (T, n) at T equal steps over one period, the first instant not repeated at the end; or a periodic
-        motion, a point of a branch or a bifurcation, for 48 of them.
+        motion, a point of a branch, a bifurcation or its `critical_motion`, for 48 of them.
     path
         A .gif file; one that is there is replaced.
     seconds
