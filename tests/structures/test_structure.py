@@ -198,6 +198,30 @@ def test_rayleigh_may_depend_on_parameters(structure):
     np.testing.assert_allclose(c, 0.1 * (np.eye(8) + k))
 
 
+@pytest.mark.parametrize("losses", [0.03, "2*eta", "matrix"])
+def test_structural_damping_is_kept(structure, losses, tmp_path):
+    given = abs(structure.stiffness) if losses == "matrix" else losses
+    damped = so.Structure(structure.mass, structure.stiffness, dofs=structure.dofs, structural=given)
+    assert "structural" in repr(damped)
+    damped.save(tmp_path / "damped.npz")
+    parameters = {"eta": 0.1} if losses == "2*eta" else {}
+    for one in (damped, so.read_structure(tmp_path / "damped.npz"), damped.with_damping(None)):
+        system = one.fixed([0]).system(parameters=parameters)
+        _, _, k = system.matrices()
+        expected = np.abs(k) if losses == "matrix" else {0.03: 0.03, "2*eta": 0.2}[losses] * k
+        np.testing.assert_allclose(system.structural.value(parameters), expected)
+
+
+def test_structural_damping_of_several_structures_in_one(structure):
+    damped = so.Structure(structure.mass, structure.stiffness, dofs=structure.dofs, structural=0.03)
+    for other, factor in ((damped, 0.03), (structure, 0.0)):
+        joined = so.structures.join(damped, other, names=["a", "b"])
+        n = structure.n
+        losses = joined.system().structural.value({})
+        np.testing.assert_allclose(losses[n:, n:], factor * structure.stiffness.toarray())
+        np.testing.assert_allclose(losses[:n, :n], 0.03 * structure.stiffness.toarray())
+
+
 @pytest.mark.parametrize(
     "damping", [so.ModalDamping(0.02), so.ModalDamping([0.02, 0.02]), so.ModalDamping(0.02, count=2)]
 )

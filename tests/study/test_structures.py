@@ -81,6 +81,45 @@ def test_tables_of_structures(table, damping, study_file, frame, tmp_path):
     np.testing.assert_allclose(c, damping(m, k), atol=1e-15)
 
 
+@pytest.mark.parametrize(
+    ("table", "losses"),
+    [
+        ('{ file = "frame.npz", structural = { loss_factor = 0.03 } }', lambda k: 0.03 * k),
+        ('{ file = "frame.npz", structural = { loss_factor = "2*k" } }', lambda k: 10.0 * k),
+        ('{ mass = "m.npy", stiffness = "k.npy", structural = "s.npy", dofs = "labels.txt" }', np.abs),
+        ('{ file = "k4.npz" }', np.abs),
+        ('{ file = "frame.npz" }', np.zeros_like),
+    ],
+)
+def test_structural_damping_in_tables(table, losses, study_file, frame, tmp_path):
+    for name, matrix in (("m", frame.mass), ("k", frame.stiffness), ("s", abs(frame.stiffness))):
+        np.save(tmp_path / f"{name}.npy", matrix.toarray())
+    nodes, directions = (np.array([str(label[i]) for label in LABELS]) for i in (0, 1))
+    np.savez(
+        tmp_path / "k4.npz", MGG=frame.mass.toarray(), KGG=frame.stiffness.toarray(), dof_nodes=nodes,
+        K4GG=abs(frame.stiffness).toarray(), dof_directions=directions,
+    )  # fmt: skip
+    (tmp_path / "labels.txt").write_text("".join(f"{node} {direction}\n" for node, direction in LABELS))
+    system = read_study(study_file(STUDY.replace('"frame.npz"', table))).system
+    k = system.matrices()[2]
+    np.testing.assert_allclose(system.structural.value(system.parameters), losses(k), atol=1e-15)
+
+
+def test_what_is_computed_is_said_before_the_first_analysis(study_file, frame, suboctave):
+    _, out, _ = suboctave("run", study_file(STUDY))
+    assert out.index("frame") < out.index("4 degrees of freedom") < out.index("response")
+    assert "natural frequencies 1, 1.73205, 2, 3.4641 rad per unit time" in out
+
+
+def test_harmonics_are_counted_by_what_is_unknown(study_file, tmp_path):
+    n = 1200
+    structure = so.Structure(np.eye(n), np.diag(np.linspace(1.0, 5.0, n)), so.Rayleigh(0.1, 0.0))
+    structure.save(tmp_path / "frame.npz")
+    text = STUDY.replace('["1042 z", "node 7 z"]', "[0, 1]").replace('"1042 z", amplitude', "3, amplitude")
+    text = text.replace('    { type = "StaticLoad", direction = { "7 x" = 1.0, "1042 z" = -0.5 }, force = 0.1 },\n', "")
+    assert read_study(study_file(text)).system.n == n
+
+
 def test_modal_damping_and_fixed_dofs(study_file, frame):
     table = '{ file = "frame.npz", fixed = ["7 x"], damping = { modal = [0.02, 0.02, 0.02] } }'
     text = STUDY.replace('"frame.npz"', table).replace('"7 x" = 1.0, ', "")
@@ -107,6 +146,8 @@ def test_modal_damping_and_fixed_dofs(study_file, frame):
         ('"frame.npz"', '{ file = "frame.npz", damping = { rayleigh = 1 } }', ["a list of two"], "structure ="),
         ('"frame.npz"', '{ file = "frame.npz", damping = { modal = -1 } }', ["damping ratios"], "structure ="),
         ('"frame.npz"', '{ file = "frame.npz", damping = 0.1 }', ["a text or a table"], "structure ="),
+        ('"frame.npz"', '{ file = "frame.npz", structural = 0.1 }', ["loss_factor"], "structure ="),
+        ('"frame.npz"', '{ file = "frame.npz", structural = { eta = 0.1 } }', ["loss_factor"], "structure ="),
         ('"frame.npz"', '{ file = "frame.npz", mass = "MGG" }', ["no matrix 'MGG'"], "structure ="),
         ('"frame.npz"', '{ file = "frame.npz", mass = 3 }', ["mass is a text"], "structure ="),
         ('"frame.npz"', "3", ["the name of a file, or a table"], "structure ="),

@@ -39,7 +39,7 @@ def target_multiplier(kind: str, angle: float) -> complex | None:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CriticalMotion:
-    """The perturbation of a motion that neither grows nor decays at a bifurcation, of any size.
+    """The perturbation of a motion that neither grows nor decays at a bifurcation, at most one in all displacements.
 
     frequencies
         Circular frequencies of its waves, (F,), rad per unit time.
@@ -159,6 +159,7 @@ class Bifurcation:
         waves = Waves.of(state, kind, vector, self.kappa)
         frequencies = waves.at.values * state.rate
         moving = state.linear.recovered(frequencies, waves.amplitudes)
+        moving = moving / np.abs(state.linear.shaped(moving)).sum(axis=0).max()
         period = self.orbit.period * (2 if kind is Kind.HALF else 1)
         return CriticalMotion(frequencies, moving, period, state.linear)
 

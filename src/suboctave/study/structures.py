@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from suboctave.errors import InputError, located, shortened, suggest
+from suboctave.model.expressions.coefficients import Coefficient, named_coefficient
 from suboctave.structures.damping import ModalDamping, Rayleigh
 from suboctave.structures.files import read_structure
 from suboctave.structures.sources import beam, plate
@@ -108,10 +109,10 @@ def _damping(given: Mapping[str, Any]) -> Rayleigh | ModalDamping:
     return Rayleigh(*value) if kind == "rayleigh" else Rayleigh.from_ratios(*value)
 
 
-def _losses(given: Any) -> Any:
+def _losses(given: Any) -> Coefficient:
     if not isinstance(given, Mapping) or list(given) != ["loss_factor"]:
         raise InputError(f"structural is {_LOSSES}, not {shortened(given)}", ("structural",))
-    return given["loss_factor"]
+    return named_coefficient(given["loss_factor"], "structural", "loss_factor")
 
 
 @dataclass(frozen=True)
