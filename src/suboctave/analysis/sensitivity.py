@@ -118,25 +118,42 @@ def sensitivity(bifurcation: Bifurcation, parameters: Sequence[str] | None = Non
     """
     free, held = _names(bifurcation, parameters)
     with one_thread():
-        names = (*free, *held)
-        curve, u = curve_through(bifurcation, bifurcation.orbit.basis, names)
-        if is_extremum(bifurcation):
-            curve = with_extremum(curve, u, bifurcation.parameter_name)
-        jacobian = curve.evaluate(u).jacobian
-        own = len(u) - len(held)
-        moved = scipy.linalg.solve(jacobian[:, :own], -jacobian[:, own:])
-        n, first = curve.balance.dimension, own - len(free)
+        curve, u, moved = _moving(bifurcation, held)
+        n, first = curve.balance.dimension, len(moved) - len(free)
         amplitude = _Amplitude(bifurcation, curve, u)
         derivatives = {}
         for column, name in zip(moved.T, held, strict=True):
             along = np.concatenate((column, [float(name == other) for other in held]))
             rates = dict(zip(free, column[first:].tolist(), strict=True)) | {"amplitude": amplitude.along(along)}
-            if bifurcation.kind == "BP" and np.abs(column[n:first]).max() * curve.spans[names.index(name)] > _UNFOLDED:
+            if (
+                bifurcation.kind == "BP"
+                and np.abs(column[n:first]).max() * curve.spans[curve.names.index(name)] > _UNFOLDED
+            ):
                 rates = dict.fromkeys(rates, float("nan"))
             derivatives[name] = rates
     position = {name: bifurcation.parameter(name) for name in free} | {"amplitude": amplitude.at(u)}
     kind = (bifurcation.isola if isinstance(bifurcation, TrackedEvent) else "") or bifurcation.kind
     return Sensitivity(kind, position, {name: bifurcation.parameter(name) for name in held}, derivatives)
+
+
+def _moving(item: Bifurcation, held: Sequence[str]) -> tuple[MotionProblem, Array, Array]:
+    """The curve through a bifurcation in its own and further parameters, its unknowns there, and the derivatives of
+    those but the further ones by these, (m, number).
+    """
+    curve, u = curve_through(item, item.orbit.basis, (*item.free_names, *held))
+    if is_extremum(item):
+        curve = with_extremum(curve, u, item.parameter_name)
+    jacobian, own = curve.evaluate(u).jacobian, len(u) - len(held)
+    return curve, u, scipy.linalg.solve(jacobian[:, :own], -jacobian[:, own:])
+
+
+def foretold(item: TrackedEvent, changes: Mapping[str, float]) -> TrackedEvent:
+    """To first order, an extremum where parameters that it is held at have changed."""
+    with one_thread():
+        curve, u, moved = _moving(item, tuple(changes))
+    change = np.array(list(changes.values()))
+    x, omega, values = curve.split(u + np.concatenate((moved @ change, change)))
+    return replace(item, orbit=replace(item.orbit, balance=curve.balance, x=x, omega=omega, values=values))
 
 
 class _Amplitude:
