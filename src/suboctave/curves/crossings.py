@@ -19,7 +19,7 @@ beyond this (and any) test: that is what the length of the examined intervals is
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
@@ -33,25 +33,32 @@ _GRID = np.array([0.02, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.98])
 
 
 def first_doubtful(
-    places: Sequence[float], tests: Sequence[Array], at: int, others: Callable[[], Sequence[Array]] = tuple
+    places: Sequence[float],
+    tests: Sequence[Array],
+    at: int,
+    others: Callable[[int], Iterable[Array]] = lambda _: (),
 ) -> tuple[int, float] | None:
     """The first of several functions of which a zero may hide between `places[at]` and `places[at + 1]`, and where, as
     a fraction of the interval, not too close to its ends, so that both parts shrink; None if none is in doubt.
 
     Three to six different places ascend, up to two on either side of the interval; `tests` has at every place the
     functions' signs and logarithms of moduli, (2, m). The side of an exact zero is the caller's business. `others`
-    gives functions with the same zeros, NaN where there is none; what one of two tells without doubt is so.
+    gives for the function k in doubt, in several ways, functions (N, 2, m') with together the same zeros: where none of
+    them is in doubt in one of these ways, and no two have a zero, so is k.
     """
     x, values, k = np.array(places), np.array(tests), -1
-    beside: Array | None = None
     while True:
         k, share = _first_doubtful(x, values, at, k + 1)
         if share < 0.0:
             return None
-        beside = np.array(others()) if beside is None else beside
-        other = beside[:, :, k : k + 1] if beside.size else beside
-        if not other.size or np.isnan(other).any() or _first_doubtful(x, other, at, 0)[1] >= 0.0:
+        if not any(_settled(x, functions, at) for functions in others(k)):
             return k, min(0.6, max(0.4, share))
+
+
+def _settled(places: Array, functions: Array, at: int) -> bool:
+    """Whether none of the functions is in doubt, and one at most has a zero."""
+    zeros = int(np.count_nonzero(functions[at, 0] != functions[at + 1, 0]))
+    return zeros <= 1 and bool(_first_doubtful(places, functions, at, 0)[1] < 0.0)
 
 
 @kernel()

@@ -17,7 +17,7 @@ one across which the orientation of the curve changes without a branch point: it
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -33,6 +33,7 @@ from suboctave.curves.sample import Sample
 from suboctave.curves.trace import Audit
 from suboctave.errors import ConvergenceError
 from suboctave.floquet.held import of_those_moved
+from suboctave.floquet.symmetric import in_rings
 
 #: multipliers of modulus above one half may move by this much per interval (relative to their modulus above one)
 MOVEMENT = 0.5
@@ -217,9 +218,13 @@ class GuardedStep(Interior):
         self.refused = self.refused or (known is None and self.size > _JUMP)
         return known
 
-    def relative(self, stencil: Sequence[Sample]) -> Sequence[Array]:
-        known = () if self.turned else of_those_moved([(s.floquet.multipliers, s.grip) for s in stencil])
-        return [np.column_stack((np.full(2, np.nan), one)) for one in known]
+    def relative(self, stencil: Sequence[Sample], k: int) -> Iterator[Array]:
+        """See `Interior.relative`: with the functions of multipliers in rings, and of those that elements move."""
+        known = [s.floquet.multipliers for s in stencil]
+        if self.turned or k == 0 or len({len(mu) for mu in known}) > 1 or not np.isfinite(known).all():
+            return
+        yield in_rings(np.array(known), k - 1)
+        yield of_those_moved(known, [s.grip for s in stencil], k - 1)
 
     def measures(self, sample: Sample) -> Array:
         """The tests at a sample, without their zeros at a branch point at which the curve turns back."""

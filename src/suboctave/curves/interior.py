@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from suboctave.bifurcation.gaps import GapExtrema
 from suboctave.continuation.problem import Array
@@ -135,9 +135,9 @@ class Interior(ABC):
     def measures(self, sample: Sample) -> Array:
         """Signs and logarithms of the moduli of functions smooth along the curve, shape (2, m)."""
 
-    def relative(self, stencil: Sequence[Sample]) -> Sequence[Array]:
-        """Functions with the same zeros as `measures` that are smoother where the linear structure has many
-        vibrations in a period, (2, m) at every sample, NaN where there is none; empty without any.
+    def relative(self, stencil: Sequence[Sample], k: int) -> Iterable[Array]:
+        """Functions (N, 2, m) with together the same zeros as `measures`' function k that are smoother where the linear
+        structure has many vibrations in a period, in several ways.
         """
         return ()
 
@@ -195,7 +195,7 @@ class Interior(ABC):
         if len(stencil) < 3:
             return 0.5, "nothing was looked at"
         places, tests = [one.place for one in stencil], [self.measures(one) for one in stencil]
-        doubt = first_doubtful(places, tests, at, lambda: self.relative(stencil))
+        doubt = first_doubtful(places, tests, at, lambda k: self.relative(stencil, k))
         return None if doubt is None else (doubt[1], self.reasons[doubt[0]])
 
     def _around(self, p: Sample, q: Sample) -> tuple[list[Sample], int]:

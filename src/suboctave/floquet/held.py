@@ -111,25 +111,22 @@ def _strengths(exponents, pushed, read, stiffness, damping, rate, out):
             out[i, j] = coupling[i, j] * coupling[j, i] / (a * b) if a > 0.0 and b > 0.0 else np.inf
 
 
-def of_those_moved(motions: Sequence[tuple[ComplexArray, Grip]]) -> list[Array]:
-    """The symmetric functions, (2, 3) each, of neighbouring motions without the multipliers that elements cannot bring
-    to the circle at any of them; empty where these cannot be told.
+def of_those_moved(multipliers: Sequence[ComplexArray], grips: Sequence[Grip], k: int) -> Array:
+    """fold, double or torus (k = 0, 1, 2) of neighbouring motions with multipliers (m,) each, without those that
+    elements cannot bring to the circle at any of them, (N, 2, 1).
     """
-    if len({len(mu) for mu, _ in motions}) > 1:
-        return []
-    multipliers, places = np.array([mu for mu, _ in motions]), np.array([known.places for _, known in motions])
-    coupled = np.zeros(motions[0][1].strengths.shape, dtype=bool)
-    for _, known in motions:
-        coupled |= known.strengths >= _SMALL
-    functions = np.empty((len(motions), 2, 3))
-    _moved(multipliers, places, coupled, functions)
-    return list(functions)
+    coupled = np.zeros(grips[0].strengths.shape, dtype=bool)
+    for one in grips:
+        coupled |= one.strengths >= _SMALL
+    function = np.empty((len(grips), 2, 1))
+    _moved(np.array(multipliers), np.array([one.places for one in grips]), coupled, k, function)
+    return function
 
 
 @kernel()
-def _moved(multipliers, places, coupled, functions):
-    """`of_those_moved` into `functions` (Q, 2, 3); multipliers (Q, m), places (Q, m), coupled (m, m): which pairs may
-    become unstable.
+def _moved(multipliers, places, coupled, k, function):
+    """`of_those_moved` into `function` (N, 2, 1); multipliers, places (N, m), coupled (m, m): which pairs may become
+    unstable.
     """
     motions, count = places.shape
     alone = np.ones(count, dtype=np.bool_)
@@ -146,25 +143,16 @@ def _moved(multipliers, places, coupled, functions):
         for j in range(count):
             beside[i] = beside[i] or (told[i] and not told[j] and coupled[j, i])
     for q in range(motions):
-        mu, own = multipliers[q], functions[q]
-        left_out, moved, size = np.zeros(mu.shape[0], dtype=np.bool_), np.empty_like(mu), 0
+        # of each multiplier: 2 if it is moved, 1 if it counts with these all the same, 0 if not
+        counts = np.full(multipliers.shape[1], 2)
         for i in range(count):
             if told[i]:
-                left_out[places[q, i]] = True
-        for i in range(mu.shape[0]):
-            if not left_out[i]:
-                moved[size] = mu[i]
-                size += 1
-        moved = moved[:size]
-        multiply(moved, own)
-        for i in range(count):
-            for j in range(moved.shape[0] if beside[i] else 0):
-                of = mu[places[q, i]] * moved[j]
-                size = abs(of)
-                # they come in conjugate pairs, but where both are real
-                if abs(of.imag) <= 1e-12 * size and of.real > 1.0:
-                    own[0, 2] = -own[0, 2]
-                own[1, 2] += np.log(abs(1.0 - of)) - 0.5 * np.log1p(size * size)
+                counts[places[q, i]] = 1 if beside[i] else 0
+        column = np.empty((counts.shape[0], counts.shape[0]), dtype=np.int64)
+        for i in range(counts.shape[0]):
+            for j in range(counts.shape[0]):
+                column[i, j] = 0 if counts[i] + (counts[j] if k == 2 else 1) > 2 else -1
+        multiply(multipliers[q], k, column, function[q])
 
 
 @kernel()

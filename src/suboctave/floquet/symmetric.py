@@ -8,6 +8,11 @@ Two multipliers that meet part at right angles, like square roots; but these are
 
 (Kuznetsov, Elements of Applied Bifurcation Theory, 3rd ed., section 10.2). Each factor is divided by a positive one,
 sqrt(1 + |mu|^2), that keeps large multipliers from drowning the rest.
+
+A structure has many multipliers, and the product of all factors changes as fast as all of them together. But moduli
+change slowly however fast the multipliers turn: where neighbouring motions have theirs in separate rings around the
+origin, the symmetric functions of each ring, and the products of `1 - mu_i mu_j` between every two, are as smooth, and
+simpler (`in_rings`). Real multipliers share one ring, whose factors alone change sign together with others.
 """
 
 from __future__ import annotations
@@ -21,6 +26,8 @@ from suboctave.harmonic.basis import Array, ComplexArray
 UNDAMPED = 1e-9
 #: squares of products beyond which a factor is one to rounding
 _LARGE = 1e280
+#: modulus of a multiplier, or of a product of two, up to which its ring would have to grow many times over to reach 1
+_INSIDE = 0.25
 
 
 def symmetric_functions(mu: ComplexArray) -> Array:
@@ -30,29 +37,77 @@ def symmetric_functions(mu: ComplexArray) -> Array:
     `torus` is constant for motions without damping, whose pairs never leave the circle. Complex factors come in
     conjugate pairs: the sign is that of the real ones.
     """
-    out = np.empty((2, 3))
-    multiply(mu, out)
+    out, whole = np.empty((2, 3)), np.zeros((len(mu), len(mu)), dtype=np.int64)
+    for k in range(3):
+        multiply(mu, k, whole, out[:, k : k + 1])
     return out
 
 
 @kernel()
-def multiply(mu, out):
-    """`symmetric_functions` into (2, 3)."""
+def multiply(mu, k, column, out):
+    """fold, double or torus (k = 0, 1, 2) of multipliers (m,) into the columns of (2, C): `column` (m, m) says into
+    which the factor of i and j < i goes, at [i, 0] for fold and double; one that is negative is left out.
+    """
     m, total = mu.shape[0], 0.0
-    for i in range(m):
+    for i in range(m if k == 2 else 0):
         total += np.log(np.abs(mu[i]))
-    for k in range(3):
-        sign, logarithm, product = 1.0, 0.0, 1.0
-        for i in range(m if k < 2 or abs(total) >= UNDAMPED else 0):
-            for j in range(i if k == 2 else 1):
-                of = mu[i] * mu[j] if k == 2 else mu[i]
-                real, size = (1.0 + of.real if k == 1 else 1.0 - of.real), of.real**2 + of.imag**2
-                if real < 0.0 and of.imag**2 <= 1e-24 * size:
-                    sign = -sign
-                if size < _LARGE:
-                    product *= (real * real + of.imag**2) / (1.0 + size)
-                if not 1.0 / _LARGE < product < _LARGE:
-                    # one logarithm for many factors
-                    logarithm += np.log(product)
-                    product = 1.0
-        out[0, k], out[1, k] = sign, 0.5 * (logarithm + np.log(product))
+    product = np.ones(out.shape[1])
+    for c in range(out.shape[1]):
+        out[0, c], out[1, c] = 1.0, 0.0
+    for i in range(m if k < 2 or abs(total) >= UNDAMPED else 0):
+        for j in range(i if k == 2 else 1):
+            c = column[i, j]
+            if c < 0:
+                continue
+            of = mu[i] * mu[j] if k == 2 else mu[i]
+            real, size = (1.0 + of.real if k == 1 else 1.0 - of.real), of.real**2 + of.imag**2
+            if real < 0.0 and of.imag**2 <= 1e-24 * size:
+                out[0, c] = -out[0, c]
+            if size < _LARGE:
+                product[c] *= (real * real + of.imag**2) / (1.0 + size)
+            if not 1.0 / _LARGE < product[c] < _LARGE:
+                # one logarithm for many factors
+                out[1, c] += np.log(product[c])
+                product[c] = 1.0
+    for c in range(out.shape[1]):
+        out[1, c] = 0.5 * (out[1, c] + np.log(product[c]))
+
+
+@kernel()
+def in_rings(mu, k):
+    """fold, double or torus (k = 0, 1, 2) of neighbouring motions with multipliers (N, m), by descending modulus, as
+    the product of functions (N, 2, C) of fewer multipliers each.
+    """
+    motions, m = mu.shape
+    lowest, highest = np.full(m, np.inf), np.zeros(m)
+    for q in range(motions):
+        for i in range(m):
+            lowest[i], highest[i] = min(lowest[i], abs(mu[q, i])), max(highest[i], abs(mu[q, i]))
+    ring, reach, rings, first = np.zeros(m, dtype=np.int64), np.zeros(m + 1), 1, 0
+    for i in range(m):
+        if i + 1 < m:
+            moved = max(highest[i] - lowest[i], highest[i + 1] - lowest[i + 1])
+            if not lowest[i] - highest[i + 1] > moved:
+                continue
+        complex_ones = True
+        for q in range(motions):
+            for j in range(first, i + 1):
+                complex_ones = complex_ones and mu[q, j].imag != 0.0
+        at = rings if complex_ones else 0
+        for j in range(first, i + 1):
+            ring[j], reach[at] = at, max(reach[at], highest[j])
+        rings, first = max(rings, at + 1), i + 1
+    number, count = np.full((rings, rings), -1), 0
+    for a in range(rings):
+        for b in range(a + 1 if k == 2 else 1):
+            if reach[a] * (reach[b] if k == 2 else 1.0) > _INSIDE:
+                number[a, b], count = count, count + 1
+    column = np.empty((m, m), dtype=np.int64)
+    for i in range(m):
+        for j in range(m):
+            a, b = (max(ring[i], ring[j]), min(ring[i], ring[j])) if k == 2 else (ring[i], 0)
+            column[i, j] = number[a, b]
+    out = np.empty((motions, 2, count))
+    for q in range(motions):
+        multiply(mu[q], k, column, out[q])
+    return out
