@@ -267,7 +267,9 @@ def _disagreement(a: CurvePoint, b: CurvePoint) -> float:
 def _explained(p: Sample, q: Sample) -> bool:
     """Whether the tests that change across an interval explain how the number of unstable multipliers changes."""
     change, changed = abs(p.unstable - q.unstable), {kind.name for kind in changes(p, q)}
-    if (change == 0 and not changed) or _open(p, q):
+    # open verdicts leave the count open, but not where the product of all pairs tells of one as well
+    pair = change > 1 and "NS" not in changed and p.measures[0, -1] != q.measures[0, -1]
+    if (change == 0 and not changed) or (_open(p, q) and not pair):
         return True
     if {"LP", "BP"} <= changed:
         # at a pitchfork the bifurcating branch turns back and is its own mirror image beyond
