@@ -71,9 +71,9 @@ class Blocks(NamedTuple):
         R, the sum of these, if this block is the first without states, (B + 1, G, G).
     coupling
         G B and G L B of every block, (B, 2, 2 G G), by q and q', channels that read and that drive.
-    share
-        Of the states before each, how far an impulse in a channel moves it, and how much one of stiffness adds to
-        squared rates, (2, S + 1, G).
+    reach, stiffening
+        How far an impulse in a channel moves it by the blocks before each, (B + 1, G), and how much one of stiffness
+        adds to squared rates, (B + 1, G).
     coupled
         How many blocks take part.
     active
@@ -93,7 +93,8 @@ class Blocks(NamedTuple):
     flexibility: Array
     flexible: Array
     coupling: Array
-    share: Array
+    reach: Array
+    stiffening: Array
     coupled: int
     active: np.ndarray
     rounding: float
@@ -223,8 +224,9 @@ def _arranged(parts: _Parts, n: int, left: Array, right: Array, active: np.ndarr
     driven = [-rows[:, n:] @ left.T for rows in parts.rows]
     read = [np.stack((right @ columns[:n], right @ columns[n:])) for columns in parts.columns]
     rates = np.array([np.abs(values).max() for values in parts.exponents])
-    sizes = [np.abs(g).max(initial=0.0) * np.abs(b).max(initial=0.0) for g, b in zip(read, driven, strict=True)]
-    taking = np.array(sizes)
+    taking = np.array(
+        [np.abs(g).max(initial=0.0) * np.abs(b).max(initial=0.0) for g, b in zip(read, driven, strict=True)]
+    )
     coupled = taking > _UNCOUPLED * taking.max(initial=0.0)
     order = np.lexsort((rates, ~coupled))
     groups = len(active)
@@ -237,8 +239,9 @@ def _arranged(parts: _Parts, n: int, left: Array, right: Array, active: np.ndarr
     first = np.concatenate(([0], np.cumsum([len(parts.matrices[i]) for i in order]))).astype(np.int64)
     into = np.concatenate([driven[i] for i in order])
     out = np.concatenate([read[i] for i in order], axis=2)
-    share = np.zeros((2, len(into) + 1, groups))
-    share[:, 1:] = np.sqrt(np.cumsum(into**2, axis=0) * np.cumsum(np.swapaxes(out, 1, 2) ** 2, axis=1))
+    reach, stiffening = np.zeros((2, len(order) + 1, groups))
+    sizes = [[np.linalg.norm(driven[i], axis=0) * np.linalg.norm(part, axis=1) for part in read[i]] for i in order]
+    reach[1:], stiffening[1:] = np.cumsum(sizes, axis=0).swapaxes(0, 1)
     coupling = np.zeros((len(order), 2, 2, groups, groups))
     for b, i in enumerate(order):
         coupling[b, 0], coupling[b, 1] = read[i] @ driven[i], read[i] @ parts.matrices[i] @ driven[i]
@@ -249,7 +252,7 @@ def _arranged(parts: _Parts, n: int, left: Array, right: Array, active: np.ndarr
     flexible[:-1] = flexibility[::-1].cumsum(axis=0)[::-1]
     return Blocks(
         motion, first, rates[order], decays, steepest, exponents, into, np.ascontiguousarray(out), flexibility,
-        flexible, coupling.reshape(len(order), 2, -1), share, int(coupled.sum()), active, rounding,
+        flexible, coupling.reshape(len(order), 2, -1), reach, stiffening, int(coupled.sum()), active, rounding,
     )  # fmt: skip
 
 

@@ -71,7 +71,7 @@ from suboctave.interruption import check_time
 
 #: how far blocks without states may move multipliers, and how much further where a force is left unbalanced altogether,
 #: which does more
-_NEGLECTED = (1e-4, 1e-2)
+_NEGLECTED = (1e-4, 5e-3)
 #: longest panels in units of the time scales of the forces, of the blocks as channels see them, and of the blocks; how
 #: much less these count if they are seen little, as a power: with them multipliers are good for 1e-8
 _LENGTHS = (1.2, 1.8, TURNS, 1.0 / 12.0)
@@ -138,9 +138,7 @@ class _Linearised:
             for g, points, widths in laws.singularities
         ]
         passages = np.concatenate(passed, axis=1) if passed else _NO_PASSAGES
-        self._most, self._held = np.zeros((2, len(self.active))), np.empty((2, len(self.active)))
-        for g, piece in zip(laws.owner.tolist(), laws.pieces[:, 0].tolist(), strict=True):
-            self._most[0, self.active == g] += abs(piece)
+        self._held = np.empty((2, len(self.active)))
         events = events_along(self._motions, laws.pieces, laws.owner, passages, grid.zr, grid.zi)
         self.events = events[np.argsort(events[:, 0], kind="stable")]
         panels, start = panels_between(self.events, longest)
@@ -191,8 +189,8 @@ class _Linearised:
         self._own.evaluate(self.path, self.law)
         blocks, resolved = self._blocks, (self.state.basis.harmonics + 0.5) * self.state.rate
         self._dynamic, self.neglected, self.coupled = states_needed(
-            self.spans, self._forces, self.law, self.base, self.active, self._most, self._held, blocks.rates,
-            blocks.decays, blocks.flexibility, blocks.share[0], blocks.first, blocks.coupled, resolved, _NEGLECTED,
+            self.spans, self._forces, self.law, self.base, self.active, self._held, blocks.rates, blocks.decays,
+            blocks.flexibility, blocks.reach, blocks.coupled, resolved, _NEGLECTED,
         )  # fmt: skip
         self._contacts()
 
@@ -203,7 +201,7 @@ class _Linearised:
         begins: np.ndarray
         finer, begins = divided(
             panels, start, self.spans, self.law, self.loose, self.active, blocks.rates, blocks.decays,
-            blocks.flexibility, blocks.share[1, blocks.first[self._dynamic]], self._dynamic, self.neglected,
+            blocks.flexibility, blocks.stiffening[self._dynamic], self._dynamic, self.neglected,
             self._kinked, _LENGTHS,
         )  # fmt: skip
         return finer, begins

@@ -20,8 +20,8 @@ ACCURACY, _FINER = 1e-8, 0.01
 MOST = 20000
 #: logarithm of the share of a block in a force below which it counts no more
 _UNSEEN = math.log(1e-9)
-#: impulses in a period that blocks without states may miss
-_CHANGES = 4.0
+#: numbers of blocks with states among many: what belongs to each of them serves other motions as well
+_LEVELS = 12
 
 
 @kernel()
@@ -71,18 +71,19 @@ def longest_rest(spans, law, base, active, start):
 
 
 @kernel()
-def with_states(most, held, rates, decays, flexibility, reach, first, coupled, resolved, time, tolerable):
+def with_states(most, changes, held, rates, decays, flexibility, reach, coupled, resolved, time, tolerable):
     """How many blocks have states, and how far the others may move multipliers, relative to the largest.
 
     A block without states follows a force F that sets in at once, and not with a delay of 1/rate: what that makes is an
     impulse `F / rate` of its share in the force, k R k q / rate, whenever a contact begins or ends. Two neighbours, one
     with states and one without, are coupled by forces besides, and the closer they lie the more that does.
 
-    most, held (2, G): largest stiffness and damping of channels, and integrals over the period, which takes `time`;
-    rates, ...: see `blocks.Blocks`; reach (S + 1, G): how far an impulse moves a channel; resolved: a rate up to which
+    most (3, G, G): largest products of the stiffnesses of two channels at one time, of one's stiffness and the other's
+    damping, and of two dampings; changes (G,): how often each comes and goes; held (2, G): integrals of stiffness and
+    damping over the period, which takes `time`; rates, ..., reach: see `blocks.Blocks`; resolved: a rate up to which
     all blocks have states; tolerable: how far the others may move multipliers.
     """
-    groups = most.shape[1]
+    groups = changes.shape[0]
     dynamic, neglected, last = coupled, 0.0, 0.0
     impulse, shifts = np.zeros(groups), np.zeros(2)
     for b in range(coupled - 1, -1, -1):
@@ -91,9 +92,9 @@ def with_states(most, held, rates, decays, flexibility, reach, first, coupled, r
         much = 0.0
         for g in range(groups):
             for h in range(groups):
-                both = (most[0, g] + most[1, g] * rates[b]) * (most[0, h] + most[1, h] * rates[b])
-                impulse[g] += both * abs(flexibility[b, g, h]) / rates[b]
-            much += _CHANGES * impulse[g] * reach[first[b], g]
+                both = most[0, g, h] + rates[b] * (most[1, g, h] + rates[b] * most[2, g, h])
+                impulse[g] += changes[h] * both * abs(flexibility[b, g, h]) / rates[b]
+            much += impulse[g] * reach[b, g]
         if not much <= tolerable:
             break
         between = 0.0
@@ -105,24 +106,55 @@ def with_states(most, held, rates, decays, flexibility, reach, first, coupled, r
                     shifts[i] += change * abs(flexibility[b - i, g, g])
             apart = (rates[b] - rates[b - 1]) * time
             between = math.exp(min(0.0, decays[b] * time)) * shifts[0] * shifts[1] / max(apart, 1e-3 * shifts[0], _TINY)
-        if much + between <= tolerable:
+        if b % max(1, coupled // _LEVELS) == 0 and much + between <= tolerable:
             dynamic, neglected, last = b, much, between
     return dynamic, neglected + last
 
 
 @kernel()
+def _tangents_met(law, base, active, panels):
+    """Of the stiffness and damping of channels on panels the `most` and `changes` of `with_states`."""
+    groups, m = active.shape[0], ORDER
+    now, before, largest = np.zeros((2, groups)), np.zeros((2, groups)), np.zeros((2, groups))
+    most, changed = np.zeros((3, groups, groups)), np.zeros((2, groups))
+    for turn in range(panels + 1):
+        p = turn % panels
+        for g in range(groups):
+            now[0, g] = now[1, g] = 0.0
+            for j in range(p * (m - 1), p * (m - 1) + m):
+                now[0, g] = max(now[0, g], abs(law[active[g], 1, j] + base[active[g], p]))
+                now[1, g] = max(now[1, g], abs(law[active[g], 2, j]))
+            for part in range(2):
+                largest[part, g] = max(largest[part, g], now[part, g])
+                changed[part, g] += abs(now[part, g] - before[part, g]) if turn > 0 else 0.0
+                before[part, g] = now[part, g]
+        for g in range(groups):
+            for h in range(groups):
+                most[0, g, h] = max(most[0, g, h], now[0, g] * now[0, h])
+                most[1, g, h] = max(most[1, g, h], now[0, g] * now[1, h] + now[1, g] * now[0, h])
+                most[2, g, h] = max(most[2, g, h], now[1, g] * now[1, h])
+    changes = np.zeros(groups)
+    for g in range(groups):
+        for part in range(2):
+            if largest[part, g] > 0.0:
+                changes[g] = max(changes[g], changed[part, g] / largest[part, g])
+    return most, changes
+
+
+@kernel()
 def states_needed(
-    spans, forces, law, base, active, most, held, rates, decays, flexibility, reach, first, coupled, resolved, limits
+    spans, forces, law, base, active, held, rates, decays, flexibility, reach, coupled, resolved, limits
 ):  # fmt: skip
     """What `with_states` says of a motion on panels with dt/ds = spans (P, m), and whether any channel acts.
 
     forces (C, .): Fourier coefficients of all channels; law, base (C, P): forces, stiffness and damping at the nodes,
-    and what is added to the stiffness on every panel; active: the channels that act; most, held (2, G): see
-    `with_states`; most has what channels can have elsewhere; rates, ..., resolved: see there. limits: how far blocks
-    without states may move multipliers, and how much further where the motion leaves all of a force unbalanced.
+    and what is added to the stiffness on every panel; active: the channels that act; held, ..., resolved: see
+    `with_states`. limits: how far blocks without states may move multipliers, and how much further where the motion
+    leaves all of a force unbalanced.
     """
     panels, m = spans.shape
     left, whole, time, acting = 0.0, _TINY, 0.0, False
+    most, changes = _tangents_met(law, base, active, panels)
     for g in range(active.shape[0]):
         held[0, g] = held[1, g] = 0.0
     for p in range(panels):
@@ -136,7 +168,6 @@ def states_needed(
                 k = max(k, abs(law[active[g], 1, j] + base[active[g], p]))
                 c = max(c, abs(law[active[g], 2, j]))
                 left = max(left, abs(law[active[g], 0, j]))
-            most[0, g], most[1, g] = max(most[0, g], k), max(most[1, g], c)
             held[0, g] += k * length
             held[1, g] += c * length
     for g in range(active.shape[0]):
@@ -147,7 +178,7 @@ def states_needed(
         acting = acting or held[0, g] > 0.0 or held[1, g] > 0.0
     tolerable = limits[0] + limits[1] * min(1.0, left / whole)
     dynamic, neglected = with_states(
-        most, held, rates, decays, flexibility, reach, first, coupled, resolved, time, tolerable
+        most, changes, held, rates, decays, flexibility, reach, coupled, resolved, time, tolerable
     )
     return dynamic, neglected, acting
 
