@@ -42,6 +42,21 @@ def test_matrices_from_files(tmp_path, monkeypatch, capsys):
     assert isinstance(scope["frame"], so.Structure)
 
 
+def test_structural_damping(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    scope: dict = {}
+    exec(compile("".join(blocks("python")[:2]), "docs/structures.md", "exec"), scope)
+    capsys.readouterr()
+    section = PAGE.split("## Structural damping")[1].split("\n## ")[0]
+    (code,), (printed,) = (re.findall(rf"^```{kind}\n(.*?)^```", section, re.M | re.S) for kind in ("python", "text"))
+    exec(compile(code, "docs/structures.md", "exec"), scope)
+    assert capsys.readouterr().out == printed
+    with np.testing.assert_raises(so.InputError):
+        so.verify(scope["response"].orbits[0])
+    equivalent = scope["hysteretic"].viscous_equivalent()
+    assert so.verify(so.frequency_response(equivalent, (3.5, 3.0)).orbits[0]).agrees
+
+
 def test_in_time(capsys):
     """The last part of the page."""
     section = PAGE.split("## In time")[1]

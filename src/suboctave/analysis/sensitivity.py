@@ -131,7 +131,9 @@ def sensitivity(bifurcation: Bifurcation, parameters: Sequence[str] | None = Non
             ):
                 rates = dict.fromkeys(rates, float("nan"))
             derivatives[name] = rates
-    position = {name: bifurcation.parameter(name) for name in free} | {"amplitude": amplitude.at(u)}
+    # the one that an extremum is of comes first
+    places = sorted(free, key=lambda name: name != bifurcation.parameter_name)
+    position = {name: bifurcation.parameter(name) for name in places} | {"amplitude": amplitude.at(u)}
     kind = (bifurcation.isola if isinstance(bifurcation, TrackedEvent) else "") or bifurcation.kind
     return Sensitivity(kind, position, {name: bifurcation.parameter(name) for name in held}, derivatives)
 
