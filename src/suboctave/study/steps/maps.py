@@ -3,19 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, Literal
 
 from pydantic import Field
 
-from suboctave.errors import ConvergenceError, suggest
+from suboctave.analysis.sensitivity import sensitivity
+from suboctave.errors import ConvergenceError, InputError, suggest
+from suboctave.kinds import KINDS, TRACKED_KINDS
 from suboctave.maps.catalogue import checked_orders, checked_values
 from suboctave.maps.isolas.map import IsolaMap, isola_map
+from suboctave.maps.isolas.margin import design_margin
 from suboctave.maps.isolas.result import Isolas
 from suboctave.maps.isolas.search import checked_levels, find_isolas
 from suboctave.maps.regimes.map import RegimeMap
 from suboctave.maps.regimes.verb import regime_map
 from suboctave.store.table import Table
-from suboctave.study.steps.base import CheckContext, Complaint, Context, Range, check_varied, tried
+from suboctave.study.steps.base import (
+    CheckContext,
+    Complaint,
+    Context,
+    Curve,
+    Motion,
+    Range,
+    Step,
+    check_varied,
+    tried,
+)
 from suboctave.study.steps.curves import FollowingStep, check_sweep
 
 
@@ -157,3 +170,67 @@ def _table_of(of_map: IsolaMap | RegimeMap, *more: str) -> Table:
     table = of_map.to_table()
     title = [table.title, *more, *(f"note: {note}" for note in of_map.notes)]
     return Table(table.columns, "; ".join(title), of_map)
+
+
+# ------------------------------------------------------------------------------------- what parameters do to an event
+class _ByParameters(Step):
+    """Says what parameters, `by`, do to something of an earlier analysis, which has values of its own."""
+
+    by: list[str] | None = None
+
+    def check(self, around: CheckContext) -> Iterator[Complaint]:
+        yield from super().check(around)
+        if self.parameters:
+            yield ("parameters",), "the analysis before this one has its own: leave them out"
+        known = ["omega", *around.system.parameters]
+        for i, name in enumerate(self.by or ()):
+            if name not in known:
+                yield ("by", i), f"there is no parameter {name!r}{suggest(name, known)}"
+
+
+class Sensitivities(_ByParameters, kind="sensitivity"):
+    """`so.sensitivity` of a bifurcation of an earlier analysis, by the parameters `by` or by all."""
+
+    start: Motion
+
+    def check(self, around: CheckContext) -> Iterator[Complaint]:
+        yield from super().check(around)
+        kind, known = self.start.bifurcation, (*TRACKED_KINDS, "extremum", "isola_centre", "isola_merging")
+        if kind is None:
+            yield ("start",), 'name a bifurcation: start = { analysis = "response", bifurcation = "PD" }'
+        elif kind in KINDS and kind not in known:
+            yield ("start", "bifurcation"), f"sensitivities are of {', '.join(known)}"
+
+    def run(self, context: Context) -> Table:
+        found = sensitivity(self.start.chosen(context.results), self.by)
+        columns = found.to_dataframe().reset_index()
+        where = ", ".join(f"{name} = {value:.7g}" for name, value in found.position.items())
+        title = f"{self.start.words}: {found.kind} at {where}"
+        return Table({str(name): column.to_numpy() for name, column in columns.items()}, title)
+
+
+class Margin(_ByParameters, kind="design_margin"):
+    """`so.design_margin` of an isola of an earlier analysis: the nearest values of the parameters `by` without it."""
+
+    isola: Curve
+    by: list[str] = Field(min_length=1)
+    at: float | None = None
+    scales: dict[str, float] | None = None
+    end: Literal["born", "merges"] = "born"
+
+    def check(self, around: CheckContext) -> Iterator[Complaint]:
+        yield from super().check(around)
+        before = around.before.get(self.isola.analysis)
+        if before is not None and before.gives != "isolas":
+            yield self.isola.key("isola"), f"the analysis {self.isola.analysis!r} looks for no isolas"
+        elif self.isola.at is not None:
+            yield ("isola", "at"), "the value of the design parameter stands beside: at = ..."
+
+    def run(self, context: Context) -> Table:
+        isolas = context.results.get(self.isola.analysis)
+        if not isinstance(isolas, Isolas):
+            raise InputError(f"the analysis {self.isola.analysis!r} gave no isolas")
+        found = design_margin(self.isola.isola_of(isolas), self.by, at=self.at, scales=self.scales, end=self.end)
+        rows = [(name, found.design[name], found.values[name], found.scaled[name]) for name in found.values]
+        title = f"{self.isola.words}: design margin {found.distance:.6g} ({found.linear:.6g} to first order)"
+        return Table.of_rows(("parameter", "design", "gone_at", "change_in_scales"), rows, title)
