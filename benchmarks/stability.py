@@ -26,8 +26,6 @@ METHODS = {
     "default": None,
     "monodromy": so.Monodromy(),
     "Hill": so.Hill(),
-    "Koopman-Hill, sub-harmonic": so.KoopmanHill(),
-    "Koopman-Hill, direct": so.KoopmanHill(subharmonic=False),
 }
 
 

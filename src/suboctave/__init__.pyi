@@ -49,7 +49,6 @@ from .experiments.trajectories import Trajectory as Trajectory, integrate as int
 from .floquet.methods import (
     Arbitration as Arbitration,
     Hill as Hill,
-    KoopmanHill as KoopmanHill,
     Monodromy as Monodromy,
 )
 from .harmonic import (

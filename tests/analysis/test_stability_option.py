@@ -44,7 +44,7 @@ class Blurred(StabilityMethod):
 
 @pytest.mark.parametrize(
     ("method", "written"),
-    [("monodromy", "monodromy"), ("hill", "Hill"), (so.KoopmanHill(), "sub-harmonic Koopman-Hill")],
+    [("monodromy", "monodromy"), ("hill", "Hill")],
 )
 def test_the_method_is_that_of_points_and_bifurcations(rattling, default, method, written):
     """The same bifurcations and verdicts; multipliers within both estimates of each other, and those of the method."""
@@ -78,8 +78,8 @@ def test_what_is_stored_says_where_it_comes_from(rattling, default):
     assert default.to_xarray().attrs["stability"] == "arbitration"
     # what is written there is what gives it again
     assert so.frequency_response(rattling, (4.5, 4.4), stability="arbitration").options["stability"] == "arbitration"
-    other = so.frequency_response(rattling, (4.5, 4.4), stability=so.KoopmanHill(subharmonic=False))
-    assert other.options["stability"] == "KoopmanHill(subharmonic=False)"
+    other = so.frequency_response(rattling, (4.5, 4.4), stability=so.Hill("symmetry"))
+    assert other.options["stability"] == "Hill(selection='symmetry')"
 
 
 def test_along_any_parameter(default):
@@ -214,7 +214,7 @@ def test_another_multiplier_on_the_circle_beside_a_bifurcation():
 def test_a_clear_curve_asks_nobody(rattling, monkeypatch):
     from suboctave.floquet import methods
 
-    for name in ("hill_multipliers", "koopman_hill_multipliers"):
+    for name in ("hill_multipliers", "hill_beside"):
         monkeypatch.setattr(methods, name, lambda *a: pytest.fail("asked without need"))
     settled = []
     honest = methods.Arbitration.settled

@@ -1,4 +1,4 @@
-"""Parts of Hill's method, the Koopman-Hill projection and the monodromy product by themselves, and where they end."""
+"""Parts of Hill's method by themselves, and where they end."""
 
 from __future__ import annotations
 
@@ -7,12 +7,11 @@ import pytest
 
 import suboctave as so
 from suboctave.floquet import hill
-from suboctave.floquet.hill import Variational, transition, two_sided
+from suboctave.floquet.hill import Variational, two_sided
 from suboctave.floquet.monodromy import floquet_multipliers
 from suboctave.harmonic import HarmonicBalance, HarmonicBasis
-from suboctave.timedomain import shoot
 
-METHODS = [so.Monodromy(), so.Hill(), so.KoopmanHill(), so.KoopmanHill(subharmonic=False)]
+METHODS = [so.Monodromy(), so.Hill()]
 WITNESSES = METHODS[1:]
 #: what the multipliers of shooting are good to themselves
 SHOOTING = 1e-9
@@ -60,42 +59,6 @@ def test_toeplitz_matrix_of_waves():
     assert matrix.tolist() == [[g[0], g[1].conj(), g[2].conj()], [g[1], g[0], g[1].conj()], [g[2], g[1], g[0]]]
 
 
-def test_the_subharmonic_projection_converges_faster():
-    """For smooth forces it does with N harmonics about what the direct one does with 2 N (Bayer & Leine 2025)."""
-    orbit = so.frequency_response(so.library.duffing(c=0.1, F=0.8), (2.6, 1.2), 21).orbits[-1]
-    system = Variational.of(orbit.state(), 120)
-    exact = transition(system, 60, subharmonic=True)
-    assert np.abs(exact - transition(system, 60, subharmonic=False)).max() < 1e-11
-
-    def error(harmonics, subharmonic):
-        return np.abs(transition(system, harmonics, subharmonic) - exact).max()
-
-    for harmonics in (6, 8, 10):
-        assert error(harmonics, True) < 0.01 * error(harmonics, False)
-        assert error(harmonics, True) < error(round(1.5 * harmonics), False)
-    assert error(16, False) < 1e-6
-
-
-@pytest.mark.parametrize("subharmonic", [True, False])
-def test_the_exponential_by_its_action(monkeypatch, subharmonic):
-    """Where forming a Hill matrix costs more, the Taylor series of its action is the same."""
-    orbit = so.frequency_response(so.library.nltva(), (0.8, 1.0), 9).orbits[-1]
-    system = Variational.of(orbit.state(), 18)
-    dense = transition(system, 9, subharmonic)
-    monkeypatch.setattr(hill, "_BEGIN", 1e9)  # what forming it costs
-    np.testing.assert_allclose(transition(system, 9, subharmonic), dense, atol=1e-11 * np.abs(dense).max())
-
-
-def test_the_monodromy_matrix_itself():
-    """Not only its eigenvalues: column by column the perturbed motion after one period, by shooting."""
-    system = so.library.duffing(c=0.1, F=0.8)
-    orbit = so.frequency_response(system, (2.6, 1.2), 21).orbits[-1]
-    scale = np.diag([1.0, orbit.omega])
-    phi = transition(Variational.of(orbit.state(), 60), 25, subharmonic=True)
-    exact = shoot(system, orbit.start(), orbit.omega).monodromy
-    np.testing.assert_allclose(scale @ phi @ np.linalg.inv(scale), exact, atol=1e-7)
-
-
 # ------------------------------------------------------------------------------------------------ limits of methods
 def test_hill_is_not_applicable_below_the_natural_frequencies(distances):
     """With too few harmonics for the highest natural frequency there is no number, but how many would do."""
@@ -116,8 +79,6 @@ def test_hill_is_not_applicable_below_the_natural_frequencies(distances):
     result = so.stability(orbit, "hill")
     assert result.applicable
     assert distances(result.multipliers, floquet_multipliers(orbit.state()).multipliers).max() < 1e-9
-    # the projection propagates the linear part exactly: no such limit
-    assert so.stability(orbit, "koopman-hill").applicable
 
 
 def test_a_strip_that_holds_another_number_is_no_result(monkeypatch):

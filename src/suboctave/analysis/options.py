@@ -48,9 +48,9 @@ class SearchOptions(RunOptions, total=False):
     stepping: Annotated[SteppingOptions | None, "Step lengths, and the largest number of points."]
     stability: Annotated[
         StabilityMethod | str | None,
-        "How the multipliers of points and bifurcations are computed: `Monodromy()`, `Hill()`, `KoopmanHill()`, or "
-        'their names "monodromy", "hill", "koopman-hill". Default: the monodromy matrix, and where a verdict is open '
-        "the others as witnesses (`Arbitration()`). Where the method is not applicable the monodromy matrix stands in, "
+        "How the multipliers of points and bifurcations are computed: `Monodromy()`, `Hill()`, or their names "
+        '"monodromy", "hill". Default: the monodromy matrix, and where a verdict is open the roots of Hill\'s '
+        "determinant beside it (`Arbitration()`). Where the method is not applicable the monodromy matrix stands in, "
         "and the branch says so.",
     ]
 

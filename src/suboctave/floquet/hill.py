@@ -31,40 +31,26 @@ their sum is far smaller). Then both with 2 H + 1 harmonics: the exponents move 
 the larger problem, its vectors being those of the first level with their first-order continuation. The move is the
 error estimate.
 
-The Koopman-Hill projection: the monodromy matrix from Hill's matrix without choosing among eigenvalues.
-
-Let `y' = A(t) y` be the linearised motion. Its solutions times waves, `z_k = exp(-i k w0 t) y`, solve
-
-    z_k' = sum_l A_{k-l} z_l - i k w0 z_k,    z_k(0) = I,    Phi(T) = z_0(T) = C exp(H T) W,
-
-H Hill's matrix, `W = [I; ..; I]`, C picking the central block; truncated to |k| <= N this is the projection of Bayer
-& Leine (Nonlinear Dyn. 111 (2023) 8439-8466). The sub-harmonic form adds the waves k + 1/2, whose z return negated, and
-takes `Phi(T) = sum_k z_k(T) + sum_k z_{k+1/2}(T)`, 2 N + 1 blocks Phi and 2 N blocks -Phi, whose truncation errors
-cancel to twice the order for smooth forces (Bayer & Leine, arXiv:2503.21318, 2025). Here in the real basis (mean,
-cosines, sines), four times cheaper, as in Bayer et al., Int. J. Non-Linear Mech. 167 (2024) 104894: W and C follow from
-the series of a Dirac comb at t = 0, which is what all z_k = I amounts to.
-
-Which coefficients of A are kept matters where contacts make them fall off like 1/q. Those beyond 0.6 N lead from the
-ends of the truncated series, where z is wrong, straight to the central block; without them the error falls like N^-3
-instead of N^-2. The sub-harmonic form does without that, up to N.
+As a witness on other multipliers the method needs no eigenvalues: beside each that is in doubt it takes the root of the
+determinant of J_kappa, kappa complex (`harmonic.perturbation`), in the unknowns of the balance, at the same two levels.
 """
 
 from __future__ import annotations
 
+import cmath
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
-from scipy.linalg import expm
 
 from suboctave.continuation.linear import Factor
 from suboctave.floquet.result import FloquetResult
 from suboctave.harmonic.assembly import galerkin
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.evaluation import BalanceState
-from suboctave.interruption import check_time
+from suboctave.harmonic.perturbation import Kind, operator, rate_by_kappa
 
 
 @dataclass(frozen=True)
@@ -190,6 +176,8 @@ _REACH = 2.0
 _LARGEST = 3000
 #: share of two effects that cancel (truncated motion, truncated perturbation) by which they are taken not to
 _CANCELLED = 0.05
+#: quotients in which a root is found, or there is none
+_QUOTIENTS = 12
 
 
 def exponents(system: Variational, harmonics: int) -> ComplexArray:
@@ -259,19 +247,10 @@ class _Waves:
         return out
 
     def vectors(self, s: complex) -> tuple[ComplexArray, ComplexArray]:
-        """Right and left null vectors of P at an eigenvalue, by inverse iteration; shape (waves, n) each."""
-        factor = Factor.of(self.matrix(s))
-        # exactly on an eigenvalue there may be a zero pivot
-        pivots = np.diagonal(factor.lu)
-        tiny = 1e-16 * float(np.abs(pivots).max())
-        np.fill_diagonal(factor.lu, np.where(np.abs(pivots) < tiny, tiny, pivots))
-        null = []
-        for adjoint in (False, True):
-            x = np.ones(len(factor.lu), dtype=complex)
-            for _ in range(2):
-                x = factor.solve(x / np.linalg.norm(x), adjoint)
-            null.append((x / np.linalg.norm(x)).reshape(len(self.index), self.system.n))
-        return null[0], null[1].conj()
+        """Right and left null vectors of P at an eigenvalue, shape (waves, n) each."""
+        right, left = null_vectors(self.matrix(s))
+        shape = len(self.index), self.system.n
+        return right.reshape(shape), left.conj().reshape(shape)
 
     def widened(self, phi: ComplexArray) -> ComplexArray:
         """A vector of fewer waves with zeros for the others."""
@@ -302,6 +281,24 @@ class _Waves:
             root -= (square * root**2 + slope * root + constant) / rate
         spread = float(np.abs(terms).sum()) + abs(square * root**2) + abs(slope * root)
         return root, 1e-15 * spread / abs(2.0 * square * root + slope)
+
+
+def null_vectors(matrix: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+    """Right and left vectors, of length one, that a nearly singular matrix all but maps to zero: `J right`, `left^H J`;
+    by inverse iteration.
+    """
+    factor = Factor.of(matrix)
+    # exactly on an eigenvalue there may be a zero pivot
+    pivots = np.diagonal(factor.lu)
+    tiny = 1e-16 * float(np.abs(pivots).max())
+    np.fill_diagonal(factor.lu, np.where(np.abs(pivots) < tiny, tiny, pivots))
+    null = []
+    for adjoint in (False, True):
+        x = np.ones(len(factor.lu), dtype=complex)
+        for _ in range(2):
+            x = factor.solve(x / np.linalg.norm(x), adjoint)
+        null.append(x / np.linalg.norm(x))
+    return null[0], null[1]
 
 
 def in_strip(values: ComplexArray, harmonics: int) -> tuple[np.ndarray, float]:
@@ -381,8 +378,7 @@ def hill_multipliers(state: BalanceState, selection: str) -> FloquetResult:
         note = f"Selection by {selection} takes an exponent twice and misses another: its multipliers are not those"
     s, spread = _second_level(state, solved, values[chosen])
     mu = np.exp(2.0 * math.pi * s)
-    # exponents are known to `spread`, multipliers relative to their size
-    errors = np.abs(mu) * np.expm1(np.minimum(2.0 * math.pi * spread, 700.0)) + 1e-14 * np.abs(mu)
+    errors = _of_multiplier(mu, spread)
     if note:
         errors = np.full(count, np.inf)
     else:
@@ -409,15 +405,110 @@ def _second_level(state: BalanceState, solved: Variational, values: ComplexArray
         middle = second.rayleigh(s, second.widened(psi), second.widened(phi))[0]
         psi, phi = second.continued(s, psi, transposed=True), second.continued(s, phi)
         better, rounding = second.rayleigh(s, psi, phi)
-        parts = abs(better - s) + _CANCELLED * (abs(middle - s) + abs(better - middle)) + rounding
         if other is not None:
-            parts += abs(other.rayleigh(s, psi, phi)[0] - better)
+            rounding += abs(other.rayleigh(s, psi, phi)[0] - better)
         near = float(np.abs(_apart(np.delete(values, j), s)).min(initial=1.0))
-        if not abs(better - s) < 0.3 * near:
-            # two exponents about to meet: first order means nothing, they move by about the root
-            better, parts = s, 2.0 * math.sqrt(near * parts) if math.isfinite(parts) else math.inf
-        moved[j], spread[j] = better, parts
+        moved[j], spread[j] = _judged((s, middle, better), rounding, near)
     return moved, spread
+
+
+def _judged(levels: tuple[complex, complex, complex], doubt: float, near: float) -> tuple[complex, float]:
+    """An exponent and how far it may be off: as solved, with the better motion, and with the better perturbation
+    besides; `doubt`: what is unsure anyway; `near`: the distance of the next exponent.
+    """
+    s, middle, better = levels
+    parts = abs(better - s) + _CANCELLED * (abs(middle - s) + abs(better - middle)) + doubt
+    if abs(better - s) < 0.3 * near:
+        return better, parts
+    # two exponents about to meet: first order means nothing, they move by about the root
+    return s, 2.0 * math.sqrt(max(near, parts) * parts) if math.isfinite(parts) else math.inf
+
+
+def hill_beside(state: BalanceState, known: FloquetResult) -> FloquetResult:
+    """Hill's method at those multipliers alone that lie within their errors of the unit circle.
+
+    Instead of all eigenvalues it takes the root of the determinant of J_kappa, kappa complex, that lies beside each: of
+    a structure as many rows as the balance has unknowns. A multiplier without a root of its own keeps its value and has
+    an infinite error, as have all that were not asked for.
+    """
+    count, rows = len(known.multipliers), state.balance.size * (4 * state.basis.harmonics + 3)
+    if rows > _LARGEST:
+        note = f"Hill's determinant of {rows} rows is larger than {_LARGEST}"
+        return FloquetResult.inapplicable(count, "Hill", note)
+    mu, errors = known.multipliers.copy(), np.full(count, np.inf)
+    refinement = refined(state)
+    # a tiny multiplier in place of none
+    starts = np.log(np.where(mu == 0.0, np.finfo(float).tiny, mu).astype(complex)) / (2.0 * math.pi)
+    for j in np.flatnonzero(known.open & (mu.imag >= 0.0)):
+        found = _beside(state, refinement, starts, int(j))
+        if found is None:
+            continue
+        twin = np.flatnonzero(known.multipliers == mu[j].conj())
+        mu[j], errors[j] = found
+        if not known.multipliers[j].imag:  # a real one, whatever the truncation makes of it
+            mu[j], errors[j] = mu[j].real, errors[j] + abs(mu[j].imag)
+        elif len(twin):
+            mu[twin[0]], errors[twin[0]] = mu[j].conj(), errors[j]
+    if not np.isfinite(errors).any():
+        return FloquetResult.inapplicable(count, "Hill", "Hill's determinant has no root beside what is in doubt")
+    return FloquetResult(mu, errors, "Hill")
+
+
+def _beside(
+    state: BalanceState, refinement: tuple[BalanceState, BalanceState | None], starts: ComplexArray, j: int
+) -> tuple[complex, float] | None:
+    """Multiplier and error of the root beside the exponent j of others, None if that is nearer to another's."""
+    root = _root(state, starts[j])
+    if root is None:
+        return None
+    s, left, right = root
+    motion, alternative = refinement
+    more = ((motion.basis.harmonics - state.basis.harmonics) * state.balance.size,) * 2
+    middle = s + _quotient(motion, s, np.pad(left, more), np.pad(right, more))[0]
+    better = _root(motion, middle)
+    if better is None or int(np.abs(_apart(starts, better[0])).argmin()) != j:
+        return None
+    doubt = _quotient(motion, *better)[1]
+    if alternative is not None:
+        other = _root(alternative, better[0])
+        doubt = math.inf if other is None else doubt + abs(other[0] - better[0])
+    near = float(np.abs(_apart(np.delete(starts, j), s)).min(initial=1.0))
+    s, spread = _judged((s, middle, better[0]), doubt, near)
+    if not spread < 0.5:  # they repeat: known to no digit
+        return None
+    mu = complex(np.exp(2.0 * math.pi * s))
+    return mu, _of_multiplier(mu, spread)
+
+
+def _root(state: BalanceState, s: complex) -> tuple[complex, ComplexArray, ComplexArray] | None:
+    """A root of the determinant of J_kappa beside an exponent, with its left and right vector: by inverse iteration and
+    two-sided Rayleigh quotients (Ruhe, SIAM J. Numer. Anal. 10 (1973) 674-689), which converge cubically.
+    """
+    for _ in range(_QUOTIENTS):
+        right, left = null_vectors(operator(state, Kind.FREE, -1j * s * state.rate))
+        step, rounding = _quotient(state, s, left, right)
+        if not cmath.isfinite(step):
+            return None
+        s += step
+        if abs(step) <= 1e-12 + rounding:
+            return s, left, right
+    return None
+
+
+def _quotient(state: BalanceState, s: complex, left: ComplexArray, right: ComplexArray) -> tuple[complex, float]:
+    """How far the root of `left^H J_kappa right` lies from s to first order, and its rounding error."""
+    kappa = -1j * s * state.rate
+    matrix = operator(state, Kind.FREE, kappa)
+    slope = rate_by_kappa(state, Kind.FREE, left, right, kappa) * state.rate
+    if slope == 0.0:
+        return complex(math.nan), math.inf
+    rounding = 1e-15 * float(np.abs(left) @ np.abs(matrix) @ np.abs(right)) / abs(slope)
+    return complex(-1j * np.vdot(left, matrix @ right) / slope), rounding
+
+
+def _of_multiplier(mu: Any, spread: Any) -> Any:
+    """Errors of multipliers from those of exponents: relative to their size."""
+    return np.abs(mu) * np.expm1(np.minimum(2.0 * math.pi * spread, 700.0)) + 1e-14 * np.abs(mu)
 
 
 def _closed(mu: ComplexArray, errors: Array) -> tuple[ComplexArray, Array]:
@@ -427,173 +518,3 @@ def _closed(mu: ComplexArray, errors: Array) -> tuple[ComplexArray, Array]:
     mutual = partner[partner] == np.arange(len(mu))
     closed = np.where(mutual, 0.5 * (mu + mu[partner].conj()), mu)
     return closed, errors + np.abs(closed - mu)
-
-
-#: terms of a Taylor step and what each costs besides, in multiplications; products that an exponential begins with
-_TERMS, _EACH, _BEGIN = 25, 1e6, 8
-#: largest Hill matrix that is attempted
-_LARGEST_PROJECTED = 6000
-#: perturbation harmonics, however few the motion has
-_FEWEST = 15
-#: share of what the motion's neglected harmonics do that is still missing when they are added to first order
-_MOTION = 0.5
-#: perturbation harmonics that are tried one after the other, in units of the motion's: direct, sub-harmonic
-_LADDER = ((0.5, 1.0, 1.5, 2.0, 3.0), (0.5, 1.0, 1.5, 2.0))
-#: move of a multiplier at which that ends
-_ACCURACY = 1e-4
-#: share of parts that cancel by which they are taken not to
-_CANCELLED_PROJECTED = 0.02
-#: what each law does: direction to the left, to the right, Galerkin matrix
-_Parts = list[tuple[Array, Array, Array]]
-
-
-def transition(system: Variational, harmonics: int, subharmonic: bool) -> Array:
-    """The monodromy matrix in (y, dy / d tau), DOFs weighted by the square roots of their masses; shape (2 n, 2 n)."""
-    kept = harmonics if subharmonic else max(1, math.ceil(0.6 * harmonics))
-    waves = _propagated(system, 2 * np.arange(harmonics + 1), kept)
-    if not subharmonic:
-        return waves[0]
-    halves = _propagated(system, 2 * np.arange(harmonics) + 1, kept)
-    # the sines of a Dirac comb vanish at its place: the mean and the cosines count
-    return waves[0] + waves[1::2].sum(axis=0) + halves[::2].sum(axis=0)
-
-
-def _propagated(system: Variational, doubled: np.ndarray, kept: int) -> Array:
-    """Series of the propagated Dirac comb after one period, shape (basis, 2 n, 2 n).
-
-    `doubled`: twice the frequencies of the basis, even or odd, in units of the base frequency.
-    """
-    n, mean = system.n, bool(doubled[0] == 0)
-    size = 2 * len(doubled) - mean
-    cosine = np.arange(1 if mean else 0, size, 2)
-    frequency = 0.5 * doubled[1 if mean else 0 :]
-    start = np.zeros((size, 2 * n, 2 * n))
-    start[cosine] = 2.0 * np.eye(2 * n)
-    if mean:
-        start[0] = np.eye(2 * n)
-    stiffness, damping = system.stiffness / system.rate**2, system.damping / system.rate
-    parts = []
-    for left, right, k, c in zip(system.left, system.right, system.k, system.c, strict=True):
-        parts.append((left, np.concatenate((right, 0.0 * right)), _projected(k / system.rate**2, doubled, kept)))
-        if c.any():
-            parts.append((left, np.concatenate((0.0 * right, right)), _projected(c / system.rate, doubled, kept)))
-    block = np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -damping]])
-    steps, rows = _taylor_steps(block, parts, float(frequency[-1])), size * 2 * n
-    # the exponential of a matrix known by its action only, or of one that is formed: whichever costs less
-    action = rows * (2 * n * (2 * n + len(parts)) + len(parts) * (size + n))
-    if rows**3 * (_BEGIN + math.log2(steps)) <= steps * _TERMS * (action + _EACH):
-        matrix = np.kron(np.eye(size), block)
-        for left, right, projected in parts:
-            matrix -= np.kron(projected, np.outer(np.concatenate((0.0 * left, left)), right))
-        turning = np.zeros((size, size))
-        turning[cosine, cosine + 1], turning[cosine + 1, cosine] = -frequency, frequency
-        matrix += np.kron(turning, np.eye(2 * n))
-        end = expm(2.0 * math.pi * matrix) @ start.reshape(-1, 2 * n)
-        return np.asarray(end).reshape(start.shape)
-    return _by_taylor(start, block, parts, cosine, frequency, steps)
-
-
-def _taylor_steps(block: Array, parts: _Parts, highest: float) -> int:
-    """Steps for a period, by the norm of Hill's matrix, were velocities measured in the highest frequency."""
-    n = block.shape[0] // 2
-    stiff = float(np.abs(block[n:, :n]).sum(axis=1).max())
-    stiff += sum(float(np.abs(p).sum(axis=1).max() * np.abs(l).max() * np.abs(r[:n]).sum()) for l, r, p in parts)
-    drag = float(np.abs(block[n:, n:]).sum(axis=1).max())
-    return max(1, math.ceil(0.5 * math.pi * (highest + math.sqrt(stiff) + drag)))
-
-
-def _projected(spectrum: np.ndarray, doubled: np.ndarray, kept: int) -> Array:
-    """Galerkin matrix of a real function's Fourier coefficients up to `kept`."""
-    padded = np.zeros(int(doubled[-1]) + 1, dtype=complex)
-    count = min(kept + 1, len(padded), len(spectrum))
-    padded[:count] = spectrum[:count]
-    return galerkin(padded, None, 0.0, bool(doubled[0] == 0), len(doubled))
-
-
-def _by_taylor(start: Array, block: Array, parts: _Parts, cosine: np.ndarray, frequency: Array, steps: int) -> Array:
-    """`exp(2 pi H)` on `start` by Taylor series of short steps: H is known by its action only."""
-    n, size, columns = block.shape[0] // 2, len(start), start.shape[2]
-    turn = frequency[:, None]
-    first = int(cosine[0])
-    cosines, sines = slice(first, size, 2), slice(first + 1, size, 2)
-    # with the states first all of them, and what the laws feel, are one product
-    acting = np.vstack([block, *(right for _, right, _ in parts)])
-    felt = np.array([projected for _, _, projected in parts]).reshape(-1, size, size)
-    pushed = np.array([left for left, _, _ in parts]).reshape(-1, n).T
-
-    def slope(z: Array) -> Array:
-        both = (acting @ z.reshape(2 * n, -1)).reshape(-1, size, columns)
-        out, inputs = both[: 2 * n], both[2 * n :]
-        out[:, cosines] -= turn * z[:, sines]
-        out[:, sines] += turn * z[:, cosines]
-        out[n:] -= (pushed @ (felt @ inputs).reshape(len(felt), -1)).reshape(n, size, columns)
-        return out
-
-    h = 2.0 * math.pi / steps
-    z = np.ascontiguousarray(start.transpose(1, 0, 2))
-    for _ in range(steps):
-        check_time()
-        term, order = z, 0
-        total = z.copy()
-        limit = 1e-17 * float(np.abs(z).max())
-        while float(np.abs(term).max()) > limit and order < 60:
-            order += 1
-            term = slope(term) * (h / order)
-            total += term
-        z = total
-    return z.transpose(1, 0, 2)
-
-
-def koopman_hill_multipliers(state: BalanceState, subharmonic: bool) -> FloquetResult:
-    """Multipliers by the Koopman-Hill projection on the motion with its neglected harmonics.
-
-    The series of the perturbation is lengthened until that moves no multiplier by more than a ten-thousandth, or by
-    more than what the motion neglects; the last move is the error estimate.
-    """
-    name = f"{'sub-harmonic' if subharmonic else 'direct'} Koopman-Hill"
-    base, count = max(_FEWEST, state.basis.harmonics), 2 * state.linear.equation_of_motion()[0].shape[0]
-    ladder = [math.ceil(share * base) for share in _LADDER[subharmonic]]
-    rows = [count * (2 * harmonics + 1) for harmonics in ladder]
-    if rows[1] > _LARGEST_PROJECTED:
-        note = f"A Hill matrix of {rows[1]} rows is larger than {_LARGEST_PROJECTED}: use the monodromy matrix"
-        return FloquetResult.inapplicable(count, name, note)
-    motion, alternative = refined(state)
-    best = Variational.of(motion, 2 * ladder[-1])
-    phi = transition(best, ladder[0], subharmonic)
-    of_motion = [_MOTION * (phi - transition(Variational.of(state, 2 * ladder[0]), ladder[0], subharmonic))]
-    if alternative is not None:
-        of_motion.append(phi - transition(Variational.of(alternative, 2 * ladder[0]), ladder[0], subharmonic))
-    for harmonics, size in zip(ladder[1:], rows[1:], strict=True):
-        if size > _LARGEST_PROJECTED:
-            break
-        shorter, phi = phi, transition(best, harmonics, subharmonic)
-        if not all(np.isfinite(matrix).all() for matrix in (phi, shorter, *of_motion)):
-            return FloquetResult.inapplicable(count, name, "The exponential of Hill's matrix is not finite")
-        mu, (series, neglected) = eigenvalues(phi, ([phi - shorter], of_motion))
-        if np.all(series <= np.maximum(_ACCURACY * np.maximum(1.0, np.abs(mu)), neglected)):
-            break
-    errors, defect = liouville(mu, series + neglected, best.decay)
-    return FloquetResult(mu, errors, name, checks={"harmonics": float(harmonics), "Liouville": defect})
-
-
-def eigenvalues(phi: Array, changes: Sequence[Sequence[Array]]) -> tuple[ComplexArray, list[Array]]:
-    """Eigenvalues by falling modulus, and how far each set of changes of the matrix, and rounding, moves each."""
-    mu, vectors = np.linalg.eig(phi)
-    order = np.argsort(-np.abs(mu), kind="stable")
-    try:
-        left = np.linalg.inv(vectors)
-    except np.linalg.LinAlgError:
-        left = np.full_like(vectors, np.nan)
-    rounding = 1e-15 * ((np.abs(left) @ np.abs(phi)) * np.abs(vectors).T).sum(axis=1)
-    moves = []
-    for together in changes:
-        moved, size = rounding + 1e-14, 1e-15 * float(np.linalg.norm(phi))
-        for change in together:
-            moved = moved + np.abs(((left @ change) * vectors.T).sum(axis=1))
-            # what cancels in this sum need not cancel in the truth
-            moved += _CANCELLED_PROJECTED * ((np.abs(left) @ np.abs(change)) * np.abs(vectors).T).sum(axis=1)
-            size += float(np.linalg.norm(change))
-        # a double eigenvalue moves by the root of the change
-        root = math.sqrt(size * max(1.0, float(np.abs(mu).max())))
-        moves.append(np.minimum(np.nan_to_num(moved, nan=np.inf), root)[order])
-    return mu.astype(complex)[order], moves

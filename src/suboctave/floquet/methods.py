@@ -22,7 +22,7 @@ from typing import ClassVar
 import numpy as np
 
 from suboctave.errors import ConvergenceError, InputError, shortened, suggest
-from suboctave.floquet.hill import hill_multipliers, koopman_hill_multipliers
+from suboctave.floquet.hill import hill_beside, hill_multipliers
 from suboctave.floquet.monodromy import floquet_multipliers
 from suboctave.floquet.result import FloquetResult, written
 from suboctave.harmonic.evaluation import BalanceState
@@ -45,6 +45,10 @@ class StabilityMethod(ABC):
     @abstractmethod
     def multipliers(self, state: BalanceState) -> FloquetResult:
         """Multipliers, error estimates and verdict of a solved motion, over the motion's own period."""
+
+    def beside(self, state: BalanceState, known: FloquetResult) -> FloquetResult:
+        """As a witness on another method's result: something of those multipliers that this leaves open is enough."""
+        return self.multipliers(state)
 
     def along(self, state: BalanceState) -> FloquetResult:
         """The same along a curve, where something must be said at every point."""
@@ -90,24 +94,9 @@ class Hill(StabilityMethod):
     def multipliers(self, state: BalanceState) -> FloquetResult:
         return _without_equation(state, self.name) or hill_multipliers(state, self.selection)
 
-
-@dataclass(frozen=True)
-class KoopmanHill(StabilityMethod):
-    """Multipliers of `C exp(H T) W`, H Hill's matrix: no selection; see `suboctave.floquet.hill`.
-
-    subharmonic
-        With the waves of half the base frequency besides: half as many harmonics reach the same accuracy.
-    """
-
-    subharmonic: bool = True
-    name: ClassVar[str] = "koopman-hill"
-
-    def __post_init__(self) -> None:
-        if not isinstance(self.subharmonic, bool):
-            raise InputError(f"subharmonic must be True or False, not {self.subharmonic!r}")
-
-    def multipliers(self, state: BalanceState) -> FloquetResult:
-        return _without_equation(state, self.name) or koopman_hill_multipliers(state, self.subharmonic)
+    def beside(self, state: BalanceState, known: FloquetResult) -> FloquetResult:
+        """Roots of Hill's determinant beside what is in doubt, whatever the selection."""
+        return hill_beside(state, known)
 
 
 @dataclass(frozen=True)
@@ -118,7 +107,7 @@ class Arbitration(StabilityMethod):
         Methods to ask, the cheapest first.
     """
 
-    witnesses: tuple[StabilityMethod, ...] = (Hill(), KoopmanHill())
+    witnesses: tuple[StabilityMethod, ...] = (Hill(),)
     name: ClassVar[str] = "arbitration"
     follows_monodromy: ClassVar[bool] = True
 
@@ -127,7 +116,7 @@ class Arbitration(StabilityMethod):
             raise InputError(f"witnesses must be several methods, as (Hill(),), not {shortened(self.witnesses)}")
         for witness in self.witnesses:
             if not isinstance(witness, StabilityMethod) or isinstance(witness, Arbitration):
-                raise InputError(f"a witness must be a method such as Hill() or KoopmanHill(), not {witness!r}")
+                raise InputError(f"a witness must be a method such as Hill(), not {witness!r}")
 
     def multipliers(self, state: BalanceState) -> FloquetResult:
         return self._weighed(state, floquet_multipliers(state), math.inf)
@@ -147,7 +136,7 @@ class Arbitration(StabilityMethod):
             return replace(
                 result, note="Undamped: multipliers stay on the unit circle, and nothing settles the verdict"
             )
-        size = len(result.multipliers) * (2 * state.basis.harmonics + 1)
+        size = 2 * state.balance.size * (2 * state.basis.harmonics + 1)
         if size > limit:
             skipped = f"Witnesses, with matrices of {size} rows, are not asked along a curve, but by so.stability"
             return replace(result, note=f"{_open(result)}. {skipped}")
@@ -155,7 +144,7 @@ class Arbitration(StabilityMethod):
         for witness in self.witnesses:
             check_time()
             try:
-                other = witness.multipliers(state)
+                other = witness.beside(state, joint)
             except ConvergenceError as failure:  # with more harmonics the motion may leave the range of the forces
                 other = FloquetResult.inapplicable(len(result.multipliers), witness.name, str(failure))
             results.append(other)
@@ -180,8 +169,10 @@ def combined(a: FloquetResult, b: FloquetResult) -> tuple[FloquetResult, str]:
     """What two methods say together, and a sentence if they contradict each other."""
     from scipy.optimize import linear_sum_assignment
 
-    # relative to the errors, so that small multipliers with many digits are paired as well as large ones
-    scale = a.errors[:, None] + b.errors[None, :]
+    # relative to the errors, so that small multipliers with many digits are paired as well as large ones; what one
+    # method does not know is where the other has it
+    known = [np.where(np.isfinite(one.errors), one.errors, 0.0) for one in (a, b)]
+    scale = known[0][:, None] + known[1][None, :]
     with np.errstate(divide="ignore", invalid="ignore"):
         cost = np.nan_to_num(np.abs(a.multipliers[:, None] - b.multipliers[None, :]) / scale, nan=1e300, posinf=1e300)
     partner = linear_sum_assignment(np.minimum(cost, 1e300))[1]
@@ -240,9 +231,7 @@ def _open(result: FloquetResult) -> str:
     return f"Undecided by {result.method}: {where}"
 
 
-METHODS: dict[str, StabilityMethod] = {
-    method.name: method for method in (Arbitration(), Monodromy(), Hill(), KoopmanHill())
-}
+METHODS: dict[str, StabilityMethod] = {method.name: method for method in (Arbitration(), Monodromy(), Hill())}
 
 
 def method_of(given: StabilityMethod | str | None) -> StabilityMethod:
@@ -256,5 +245,5 @@ def method_of(given: StabilityMethod | str | None) -> StabilityMethod:
     if isinstance(given, type) and issubclass(given, StabilityMethod):
         raise InputError(f"give an object, {given.__name__}(), instead of the class")
     if not isinstance(given, StabilityMethod):
-        raise InputError(f"a stability method is Monodromy(), Hill(), KoopmanHill() or a name, not {given!r}")
+        raise InputError(f"a stability method is Monodromy(), Hill() or a name, not {given!r}")
     return given

@@ -91,6 +91,12 @@ class FloquetResult:
         return symmetric_functions(self.multipliers)
 
     @property
+    def open(self) -> np.ndarray:
+        """Which multipliers lie within their errors of the unit circle, (2 n,)."""
+        within: np.ndarray = np.abs(np.abs(self.multipliers) - 1.0) <= self.errors
+        return within
+
+    @property
     def undamped(self) -> bool:
         """True if the product of all multipliers is one to rounding: pairs then stay on the unit circle."""
         return abs(float(np.log(np.maximum(np.abs(self.multipliers), 1e-300)).sum())) < UNDAMPED

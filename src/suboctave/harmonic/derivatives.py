@@ -227,7 +227,7 @@ def _trilinear(weights: Array, a: ComplexArray, b: ComplexArray, c: ComplexArray
 def _shift(out: Frequencies, *waves: Waves) -> int:
     """By how many whole frequencies the lowest of a product lies above the lowest wanted."""
     exact = sum(one.at.lowest for one in waves) - out.lowest
-    shift = round(exact)
+    shift = round(exact.real)
     if abs(exact - shift) > 1e-6:
         raise ValueError("the product of these waves has other frequencies than those requested")
     return shift

@@ -48,9 +48,9 @@ class Gradient:
     kappa: complex
 
 
-def operator(state: BalanceState, kind: Kind, kappa: float = 0.0) -> np.ndarray:
+def operator(state: BalanceState, kind: Kind, kappa: complex = 0.0) -> np.ndarray:
     """J_kappa: real of size n (2 H + 1) or n (2 H + 2), complex of size n (2 H + 1) for Kind.FREE (kappa in rad per
-    time).
+    time; complex for perturbations that grow like `exp(i kappa t)`).
     """
     if kind is Kind.INTEGER:
         return state.jacobian
@@ -91,7 +91,7 @@ def _two_sided(spectrum: ComplexArray, lag: np.ndarray) -> ComplexArray:
 class _Form:
     """The form `left^H J_kappa right` at a motion: both vectors as waves, and what elements make of the right one."""
 
-    def __init__(self, state: BalanceState, kind: Kind, left: np.ndarray, right: np.ndarray, kappa: float) -> None:
+    def __init__(self, state: BalanceState, kind: Kind, left: np.ndarray, right: np.ndarray, kappa: complex) -> None:
         self.state, self.kind = state, kind
         self.u = Waves.of(state, kind, left, kappa, left=True).amplitudes
         waves = Waves.of(state, kind, right, kappa)
@@ -201,9 +201,11 @@ def _form_rate(form: _Form, name: str) -> complex:
     return rate
 
 
-def rate_by_kappa(state: BalanceState, kind: Kind, left: np.ndarray, right: np.ndarray) -> complex:
-    """Derivative of `left^H J_kappa right` by kappa alone, at kappa = 0."""
-    return complex(_Form(state, kind, left, right, 0.0).by_frequency().sum())
+def rate_by_kappa(
+    state: BalanceState, kind: Kind, left: np.ndarray, right: np.ndarray, kappa: complex = 0.0
+) -> complex:
+    """Derivative of `left^H J_kappa right` by kappa alone."""
+    return complex(_Form(state, kind, left, right, kappa).by_frequency().sum())
 
 
 def parameter_gradient(state: BalanceState, left: Array, name: str, names: tuple[str, ...]) -> Gradient:
@@ -303,7 +305,7 @@ def operator_along(
     return np.stack(columns, axis=1)
 
 
-def _channel_along(form: _Form, channel: Channel, a: Direction, turn: Array) -> ComplexArray:
+def _channel_along(form: _Form, channel: Channel, a: Direction, turn: np.ndarray) -> ComplexArray:
     """What a channel makes of the right vector, changed along a direction, (F,); `turn`: changes of the frequencies."""
     rows = form.rows(channel)
     total = np.zeros(rows.shape[1], dtype=complex)

@@ -10,8 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.evaluation import BalanceState
@@ -32,25 +34,26 @@ class Kind(Enum):
 class Frequencies:
     """`count` consecutive frequencies from `lowest` on, in units of the base frequency."""
 
-    lowest: float
+    lowest: complex
     count: int
 
     @classmethod
-    def of(cls, state: BalanceState, kind: Kind, kappa: float = 0.0) -> Frequencies:
-        """Those of the operator J_kappa; kappa in rad per time, for Kind.FREE."""
+    def of(cls, state: BalanceState, kind: Kind, kappa: complex = 0.0) -> Frequencies:
+        """Those of the operator J_kappa; kappa in rad per time, for Kind.FREE, complex where perturbations grow."""
         high = state.basis.harmonics
         if kind is Kind.HALF:
             return _frequencies(-high - 0.5, 2 * high + 2)
         return _frequencies(-high + (kappa / state.rate if kind is Kind.FREE else 0.0), 2 * high + 1)
 
     @cached_property
-    def values(self) -> Array:
+    def values(self) -> NDArray[Any]:
         """All of them, shape (count,)."""
-        return np.asarray(self.lowest + np.arange(self.count), dtype=float)
+        values: NDArray[Any] = self.lowest + np.arange(self.count, dtype=float)
+        return values
 
 
 @lru_cache(maxsize=256)
-def _frequencies(lowest: float, count: int) -> Frequencies:
+def _frequencies(lowest: complex, count: int) -> Frequencies:
     """The same object for the same frequencies, which keeps their values."""
     return Frequencies(lowest, count)
 
@@ -63,7 +66,7 @@ class Waves:
     at: Frequencies
 
     @classmethod
-    def of(cls, state: BalanceState, kind: Kind, vector: np.ndarray, kappa: float = 0.0, left: bool = False) -> Waves:
+    def of(cls, state: BalanceState, kind: Kind, vector: np.ndarray, kappa: complex = 0.0, left: bool = False) -> Waves:
         """A vector of the basis of J_kappa: real coefficients of cosines and sines, or complex amplitudes.
 
         Left vectors are scaled such that `left^H J_kappa right` is the same number in both notations.

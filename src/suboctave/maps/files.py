@@ -29,7 +29,7 @@ import numpy as np
 from suboctave.bifurcation.bifurcation import TrackedEvent
 from suboctave.continuation import NewtonOptions, SteppingOptions
 from suboctave.errors import InputError
-from suboctave.floquet.methods import Arbitration, Hill, KoopmanHill, Monodromy, StabilityMethod
+from suboctave.floquet.methods import Arbitration, Hill, Monodromy, StabilityMethod
 from suboctave.harmonic.linear_part import LinearPart
 from suboctave.interruption import Interruption
 from suboctave.maps.catalogue import Catalogue, SearchRange
@@ -48,8 +48,7 @@ if TYPE_CHECKING:
     import xarray
 
 _CLASSES: dict[str, type] = {
-    c.__name__: c
-    for c in (NewtonOptions, SteppingOptions, Arbitration, Hill, KoopmanHill, Monodromy, Interruption, Probe)
+    c.__name__: c for c in (NewtonOptions, SteppingOptions, Arbitration, Hill, Monodromy, Interruption, Probe)
 }
 
 

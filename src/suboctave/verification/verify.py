@@ -62,9 +62,9 @@ def stability(
     Parameters
     ----------
     method
-        `Monodromy()`, `Hill()`, `KoopmanHill()`, or their names "monodromy", "hill", "koopman-hill". Default: the
-        monodromy matrix, and where a multiplier lies within its error of the unit circle the others as witnesses. A
-        method that cannot say anything says so (`applicable`, `note`).
+        `Monodromy()`, `Hill()`, or their names "monodromy", "hill". Default: the monodromy matrix, and where a
+        multiplier lies within its error of the unit circle the root of Hill's determinant beside it. A method that
+        cannot say anything says so (`applicable`, `note`).
 
     Raises
     ------
