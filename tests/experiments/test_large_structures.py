@@ -5,12 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from chains import chain_matrices
+from scipy import sparse
 
 import suboctave as so
 from suboctave.errors import InputError
 from suboctave.experiments.common import coordinates
+from suboctave.experiments.stepped_sine import check_stepped_sine
 from suboctave.harmonic import StructuralMatrices
 from suboctave.model.projected import ProjectedSystem, Recovered
+from suboctave.pictures import in_time
 from suboctave.projection import small_system
 from suboctave.timedomain import integrate as witness
 
@@ -236,3 +239,36 @@ def test_elements_between_places_and_loads_of_inertia():
     path = so.integrate(system, omega=0.9, periods=3)
     exact = witness(system, np.zeros(2 * N), path.time, 0.9)
     assert np.abs(path.displacement - exact.x).max() < 1e-3 * np.abs(exact.x).max()
+
+
+def test_a_stepped_sine_of_a_large_structure_is_not_refused_by_its_degrees_of_freedom():
+    """What is kept are coordinates of modes; that alone is counted before anything is computed."""
+    n = 100_000
+    one = sparse.eye_array(n).tocsr()
+    large = so.System(one, 0.1 * one, one, [so.CubicSpring(0, 1.0)], [so.HarmonicLoad(0, 0.1)])
+    plan = {"direction": "both", "settle": 10, "measure": 10, "state": None, "tap": None, "harmonics": [1.0]}
+    check_stepped_sine(large, (0.5, 1.5), steps=2000, noise=0.0, **plan)
+    with pytest.raises(InputError, match="more than fit"):
+        check_stepped_sine(large, (0.5, 1.5), steps=5_000_000, noise=0.0, **plan)
+
+
+def test_pictures_read_the_degree_of_freedom_that_they_draw(stop, monkeypatch, tmp_path):
+    """Of 60 displacements one column is recovered; the picture is that of the whole array."""
+    path = so.integrate(stop, omega=0.9, periods=3)
+    sections = so.poincare_sections(stop, omega=0.9, states=[np.zeros(2 * N)], periods=5, transient=5)
+    test = so.stepped_sine(stop, (0.8, 0.9), steps=2, settle=2, measure=2, harmonics=[1.0, 2.0])
+    read, honest = [], Recovered._displaced
+
+    def noted(own, coordinates, last):
+        read.append(last)
+        return honest(own, coordinates, last)
+
+    for result, options in ((path, {"dof": 7}), (sections, {}), (test, {"harmonic": 2}), (test, {"dof": 7})):
+        getattr(in_time, result.picture)(result.to_xarray(), path=tmp_path / "whole.svg", **options)
+        with monkeypatch.context() as patched:
+            patched.setattr(Recovered, "_displaced", noted)
+            result.plot(tmp_path / "one.svg", **options)
+        marks = [(tmp_path / f"{name}.svg").read_text().count("<use") for name in ("whole", "one")]
+        assert marks[0] == marks[1] > 0
+    assert read
+    assert all(np.arange(N)[last].size == 1 for last in read)

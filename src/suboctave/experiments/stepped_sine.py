@@ -41,6 +41,7 @@ from suboctave.model.inputs import check_count, observed_dof, start_state, timed
 from suboctave.model.system import System
 from suboctave.options import with_options
 from suboctave.progress import Report, reporting
+from suboctave.projection import COMPLETE
 from suboctave.timedomain.flow import Flow, check_extent
 
 _DIRECTIONS = ("up", "down", "both")
@@ -94,7 +95,7 @@ def stepped_sine(
         If the motion leaves the range of numbers.
     """
     how = checked_integration(system, options)
-    test = _Test(system, how, omega, steps, direction, settle, measure, state, tap, harmonics, noise, seed)
+    test = _Test(system, how, omega, steps, direction, settle, measure, state, tap, harmonics, noise, seed, system.n)
     shape, n = (len(test.directions), len(test.grid)), system.n
     out = SteppedSine(
         test.grid, test.directions, test.multiples, np.full((*shape, len(test.multiples), n), np.nan, dtype=complex),
@@ -111,8 +112,12 @@ def stepped_sine(
 
 
 def check_stepped_sine(system: System, omega: Any, observe: int | str | None = None, **arguments: Any) -> None:
-    """Refuse arguments of `stepped_sine`; nothing is computed."""
-    _Test(system, checked_integration(system, {"observe": observe}), omega, **{"seed": 0, **arguments})
+    """Refuse arguments of `stepped_sine`; nothing is computed.
+
+    How many modes a large structure is integrated in is not known yet: what is too much for them the verb says.
+    """
+    how, fewest = checked_integration(system, {"observe": observe}), min(system.n, COMPLETE)
+    _Test(system, how, omega, **{"seed": 0, "coordinates": fewest, **arguments})
 
 
 @dataclass
@@ -131,6 +136,7 @@ class _Test:
     harmonics: Sequence[float]
     noise: float
     seed: int
+    coordinates: int
 
     def __post_init__(self) -> None:
         self.start = start_state(self.system, self.state)
@@ -153,7 +159,7 @@ class _Test:
         except (TypeError, ValueError):
             raise InputError(f"seed must be a whole number, 0 or more, not {shortened(self.seed)}") from None
         _loads(self.system, float(self.grid[0]))
-        tests, size = len(self.grid) * len(self.directions), 2 * self.system.n
+        tests, size = len(self.grid) * len(self.directions), 2 * self.coordinates
         check_extent(tests, self.settle + self.measure, tests * size * (len(self.multiples) + 3))
         self.tapped = _tap(self.system, self.tap, self.grid)
 

@@ -42,7 +42,7 @@ def plot_trajectory(trajectory: xarray.Dataset, *, dof: int | None = None, quant
     check_quantity(quantity, ("displacement", "velocity"))
     dof = checked_dof(trajectory, dof)
     time = trajectory["time"].to_numpy() * float(trajectory.attrs["omega"]) / (2.0 * np.pi)
-    at = np.array([time, trajectory[quantity].to_numpy()[:, dof]])
+    at = np.array([time, _along(trajectory[quantity], dof)])
     instants = at[:, :: int(trajectory.attrs["steps_per_period"])]
     line = Polyline(at, Pen(style.INK), role="motion")
     strobe = Markers(instants, dot(style.CURVE_COLOURS[0], 3.0), cut=True, role="strobe", layer=4.0)
@@ -55,7 +55,7 @@ def plot_trajectory(trajectory: xarray.Dataset, *, dof: int | None = None, quant
 def plot_sections(sections: xarray.Dataset, *, dof: int | None = None) -> Layout:
     """Stroboscopic points in the plane of displacement and velocity of one degree of freedom, coloured by period."""
     dof = checked_dof(sections, dof)
-    at = np.array([sections[name].to_numpy()[..., dof] for name in ("displacement", "velocity")])
+    at = np.array([_along(sections[name], dof) for name in ("displacement", "velocity")])
     frame, periods = Frame(), sections["period"].to_numpy()
     for period in sorted(set(periods.tolist()), key=lambda p: (p != 0, p)):
         last = slice(-period, None) if period else slice(None)
@@ -176,7 +176,7 @@ def _beneath(curves: Any, x: str, view: View) -> Frame:
 def _add_motions(frame: Frame, row: xarray.Dataset, start: str, dof: int, sections: bool, suffix: str) -> None:
     """Add the motions of one way to start, their amplitudes or their `sections`; `suffix` to their names."""
     values, periods = row["value"].to_numpy(), row["period"].to_numpy()
-    table = row["displacement" if sections else "largest"].to_numpy()[..., dof]
+    table = _along(row["displacement" if sections else "largest"], dof)
     for period in sorted({int(p) for p in periods if p >= 0}):
         here, role, name = np.flatnonzero(periods == period), f"{start} {_name(period)}", _name(period) + suffix
         known = table[here][:, -period:] if period else table[here]
@@ -196,13 +196,13 @@ def _points(at: np.ndarray, period: int, size: float, role: str) -> Markers:
 
 def _component(test: xarray.Dataset, harmonic: float, dof: int) -> np.ndarray:
     if harmonic == 1:
-        return np.asarray(np.hypot(test["response_real"], test["response_imag"]))[..., dof]
+        return np.hypot(_along(test["response_real"], dof), _along(test["response_imag"], dof))
     multiples = test["multiple"].to_numpy()
     which = np.flatnonzero(np.abs(multiples - harmonic) < 1e-9)
     if not which.size:
         raise InputError(f"harmonic={harmonic:g} was not measured; there are {multiples.tolist()}")
-    modulus = np.asarray(np.hypot(test["component_real"], test["component_imag"]))
-    return np.asarray(modulus[:, :, int(which[0]), dof])
+    real, imaginary = (_along(test[f"component_{part}"], dof)[:, :, int(which[0])] for part in ("real", "imag"))
+    return np.hypot(real, imaginary)
 
 
 def _measured(measured: Any, harmonic: float) -> list[Any]:
@@ -234,6 +234,11 @@ def symbol_of(dataset: xarray.Dataset, dof: int, order: int) -> str:
 def checked_dof(dataset: xarray.Dataset, dof: int | None) -> int:
     """The degree of freedom that is drawn, default the observed one; InputError where there is none."""
     return chosen_dof(dof, int(dataset.attrs["observed"]), int(dataset.attrs["dofs"]))
+
+
+def _along(variable: xarray.DataArray, dof: int) -> np.ndarray:
+    """Values of one degree of freedom; of a large structure no others are recovered."""
+    return variable.isel(dof=dof).to_numpy()
 
 
 # ----------------------------------------------------------------------------------------------------- chaos and basins
