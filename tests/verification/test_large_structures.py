@@ -97,3 +97,13 @@ def test_a_body_that_nothing_holds_between_its_contacts(monkeypatch):
         assert len(path.contacts) > 2
         ends.append(path.end)
     np.testing.assert_allclose(ends[0], ends[1], atol=1e-8)
+
+
+def test_velocities_that_too_few_harmonics_leave_out_are_no_other_motion():
+    """A contact rounds off velocities more slowly than displacements: that is said, and more harmonics agree."""
+    system = so.library.reference_oscillator(p=0.55, j=0.0)
+    found = [so.verify(orbit) for orbit in so.frequency_response(system, (2.4, 1.7), harmonics=7).orbits[::3]]
+    others = [one for one in found if not one.agrees]
+    assert others
+    assert all("leave out as much" in one.reason for one in others)
+    assert all(so.verify(o).agrees for o in so.frequency_response(system, (2.4, 1.7), harmonics=63).orbits[::9])

@@ -37,6 +37,7 @@ from suboctave.projection import system_of_motions
 from suboctave.results.branch import Branch, TrackedBranch
 from suboctave.timedomain import PeriodicSolution, integrate, locate_by_shooting, shoot
 from suboctave.timedomain.multiple_shooting import MultipleShooting, ShotMotions
+from suboctave.verification.harmonics import left_out, up_to_harmonics
 from suboctave.verification.result import (
     AGREES,
     DISAGREES,
@@ -151,6 +152,8 @@ def verify_motion(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: fl
         same = distance <= tolerance
         return verdict(same, words if same else f"{words}: another one (relative distance {distance:.1e})")
     if not distance <= tolerance:
+        if not touches and distance <= left_out(motion):
+            return verdict(False, up_to_harmonics(motion, distance))
         other = "a motion that does not graze" if touches else "another motion"
         return verdict(False, f"Shooting arrives at {other} (relative distance {distance:.1e})")
     # at an extremum or a point of codimension two a multiplier is critical: no verdict to compare
@@ -342,7 +345,9 @@ def _judged(branch: Branch, i: int, shot: Shot, tolerance: float) -> VerifiedPoi
         if known:
             error = pairing(floquet.multipliers, multipliers, relative=True)
         allowed = tolerance + 10.0 * (floquet.error + doubt) + 100.0 * distance
-        if distance > tolerance:
+        if tolerance < distance <= left_out(point.orbit):
+            outcome, reason = OPEN, up_to_harmonics(point.orbit, distance)
+        elif distance > tolerance:
             outcome, reason = DISAGREES, f"Shooting arrives at another motion (relative distance {distance:.1e})"
         elif not known:
             outcome, reason = OPEN, "The same motion; the branch has no verdict here"
