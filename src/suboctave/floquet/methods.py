@@ -96,6 +96,9 @@ class Hill(StabilityMethod):
 
     def beside(self, state: BalanceState, known: FloquetResult) -> FloquetResult:
         """Roots of Hill's determinant beside what is in doubt, whatever the selection."""
+        if not state.balance.system.structural.zero:
+            note = "Structural damping: multipliers are roots of Hill's determinant already"
+            return FloquetResult.inapplicable(len(known.multipliers), self.name, note)
         return hill_beside(state, known)
 
 
