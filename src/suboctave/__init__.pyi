@@ -8,6 +8,7 @@ from .analysis.branches import (
 )
 from .analysis.diagram import bifurcation_diagram as bifurcation_diagram
 from .analysis.locate_extremum import locate_extremum as locate_extremum
+from .analysis.phase_resonance import phase_resonance as phase_resonance
 from .analysis.sensitivity import Sensitivity as Sensitivity, sensitivity as sensitivity
 from .analysis.subharmonics import (
     Seeds as Seeds,
