@@ -1,0 +1,56 @@
+"""Ridges from a response: its highest point, followed in a second parameter (`curves.kinds.ridge`)."""
+
+from __future__ import annotations
+
+from typing import Any, Unpack
+
+import numpy as np
+
+from suboctave.analysis.options import TrackOptions
+from suboctave.analysis.track import track
+from suboctave.curves.trace import BranchPoint
+from suboctave.errors import InputError, is_number, shortened
+from suboctave.options import with_options
+from suboctave.results.branch import Branch, TrackedBranch
+
+
+@with_options(TrackOptions)
+def track_peak(
+    response: Branch | BranchPoint,
+    parameter: str,
+    bounds: tuple[float, float],
+    *,
+    harmonic: float | None = None,
+    **options: Unpack[TrackOptions],
+) -> TrackedBranch:
+    """The resonance peak of a response, where the amplitude is largest along it, followed in a second parameter.
+
+    Raze, Volvert & Kerschen, Mechanical Systems and Signal Processing (2024). Through limit points of the responses;
+    other extrema of the amplitude, such as an antiresonance, are followed from a point beside them.
+
+    Parameters
+    ----------
+    response
+        A branch over omega, whose highest point is taken, or one of its `points` beside an extremum.
+    parameter, bounds
+        The second parameter and its range (from, to).
+    harmonic
+        The amplitude is that of the harmonic at this multiple of omega; by default the largest |x|.
+
+    Raises
+    ------
+    InputError
+        Wrong input, before any work.
+    ConvergenceError
+        If no extremum is found beside the point.
+    """
+    if harmonic is not None and not (is_number(harmonic) and harmonic > 0.0):
+        raise InputError(f"harmonic must be a positive multiple of omega, not {shortened(harmonic)}")
+    start: Any = response
+    if isinstance(response, Branch):
+        if response.name != "omega" or not len(response):
+            raise InputError("the peak is that of a response over omega: give such a branch, or one of its points")
+        heights = response.amplitude if harmonic is None else np.abs(response.harmonic(harmonic))
+        start = response.points[int(np.argmax(heights))]
+    onto: Any = "ridge" if harmonic is None else {"name": "harmonic_ridge", "harmonic": harmonic}
+    return track(start, parameter, bounds, onto=onto, **options)

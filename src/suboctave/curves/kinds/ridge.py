@@ -1,0 +1,167 @@
+"""Ridges: motions whose amplitude is extreme along the response, over the first free parameter.
+
+With t the direction of the response there, `R_X t_X + R_p t_p = 0`, and G the amplitude,
+
+    h = G_X . t_X = 0,    [R_X R_p; c^T] t = [0; 1],
+
+c the direction at the last point: smooth through limit points, where p turns (adjoint form of Raze, Volvert &
+Kerschen, Mechanical Systems and Signal Processing 2024). G is the largest |x| of the observed displacement, or the
+amplitude of one of its harmonics. h changes by
+
+    dh = t_X . dG_X - m . d(R_X t_X + R_p t_p),    [R_X R_p; c^T]^T [m; .] = [G_X; 0],
+
+the second part a central difference of two Jacobians along t.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from suboctave.bifurcation.bifurcation import Bifurcation
+from suboctave.continuation.linear import Factor, length
+from suboctave.curves.augmentation import Augmentation, Equations
+from suboctave.errors import ConvergenceError
+from suboctave.harmonic.basis import Array, HarmonicBasis, harmonic_index, to_complex
+from suboctave.harmonic.evaluation import BalanceState
+from suboctave.harmonic.trigonometric import peak
+from suboctave.lazy import lazy
+
+#: step of the difference of Jacobians, in units of the motion and of the first parameter
+_STEP = 1e-5
+
+
+@dataclass(frozen=True)
+class Ridge(Augmentation):
+    """`dof` of the displacement; `multiple` of omega of its harmonic, None for the largest displacement; `border`, the
+    direction c in units of the motion's size and the parameter's value, `along`.
+    """
+
+    dof: int
+    multiple: float | None
+    border: Array
+    along: float
+
+    @property
+    def name(self) -> str:
+        """Kind of motions."""
+        return "ridge" if self.multiple is None else "harmonic_ridge"
+
+    @classmethod
+    def through(cls, item: Bifurcation, state: BalanceState, names: tuple[str, ...]) -> tuple[Ridge, Array]:
+        """See `Augmentation.through`."""
+        value = state.omega if names[0] == "omega" else state.values[names[0]]
+        blank = cls(item.context["observe"], item.context["onto"].get("harmonic"), np.zeros(0), abs(value) or 1.0)
+        scaled = blank.at(state, np.zeros(0), names).scaled
+        return replace(blank, border=np.linalg.svd(scaled)[2][-1]), np.zeros(0)
+
+    def at(self, state: BalanceState, extra: Array, names: tuple[str, ...]) -> RidgeEquations:
+        return RidgeEquations(self, state, names)
+
+    def resized(self, basis: HarmonicBasis, size: int) -> Ridge:
+        kept = np.zeros(basis.size * size)
+        own = self.border[:-1]
+        kept[: min(len(kept), len(own))] = own[: len(kept)]
+        border = np.append(kept, self.border[-1])
+        return replace(self, border=border / length(border))
+
+
+class RidgeEquations(Equations):
+    """h in units of the motion."""
+
+    def __init__(self, of: Ridge, state: BalanceState, names: tuple[str, ...]) -> None:
+        self.of, self.state, self.names = of, state, names
+
+    @lazy
+    def _sizes(self) -> Array:
+        """Units of the coefficients and of the first parameter."""
+        weight = self.state.balance.per_unknown(self.state.balance.scales()[0])
+        size = length(weight * self.state.x.ravel()) or 1.0
+        return np.append(size / weight, self.of.along)
+
+    @lazy
+    def scaled(self) -> Array:
+        """`[R_X R_p]` in these units, (n, n + 1)."""
+        scaled: Array = self.state.extended_jacobian(self.names[0]) * self._sizes
+        return scaled
+
+    @lazy
+    def _direction(self) -> tuple[Array, Array]:
+        """t and m, both in these units."""
+        n = len(self.scaled)
+        matrix = np.concatenate((self.scaled, self.of.border[None] * np.abs(self.scaled).max()))
+        factor = Factor.of(matrix)
+        if factor.singular:
+            raise ConvergenceError("two branches meet at the ridge")
+        t = factor.solve(np.eye(1, n + 1, n)[0])
+        t = t / length(t)
+        gradient = np.append(self._amplitude[1] * self._sizes[:-1], 0.0)
+        return t, factor.solve(gradient, adjoint=True)[:n]
+
+    @lazy
+    def _amplitude(self) -> tuple[float, Array, Array, float]:
+        """The amplitude G, G_X, and the part `c b b^T` of its second derivative: b and c."""
+        state = self.state
+        reads = state.linear.retain(np.eye(state.balance.system.n)[self.of.dof])
+        c = to_complex(state.x) @ reads
+        if self.of.multiple is not None:
+            at = 2 * harmonic_index(self.of.multiple, state.basis.nu) - 1
+            if at > len(state.x) - 2:
+                raise ConvergenceError(f"the harmonic at {self.of.multiple} omega is not kept")
+            z = state.x[at : at + 2] @ reads
+            size = float(length(z)) or np.finfo(float).tiny
+            rows = np.zeros((2, len(state.x)))
+            rows[0, at : at + 2], rows[1, at : at + 2] = z / size, (-z[1] / size, z[0] / size)
+            along, across = (np.outer(row, reads).ravel() for row in rows)
+            return size, along, across, 1.0 / size
+        size, tau, value = peak(np.ascontiguousarray(c), 8 * state.basis.harmonics + 8)
+        k = np.arange(len(c))
+        bend = float(np.real(-(k**2) * c @ np.exp(1j * k * tau)))
+        side = 1.0 if value >= 0.0 else -1.0
+        waves = np.empty((2, len(state.x)))
+        waves[:, 0] = 1.0, 0.0
+        waves[0, 1::2], waves[0, 2::2] = np.cos(k[1:] * tau), np.sin(k[1:] * tau)
+        waves[1, 1::2], waves[1, 2::2] = -k[1:] * np.sin(k[1:] * tau), k[1:] * np.cos(k[1:] * tau)
+        along, turning = (side * np.outer(row, reads).ravel() for row in waves)
+        return size, along, turning, -side / bend if bend else 0.0
+
+    @lazy
+    def _slope(self) -> float:
+        """h."""
+        return float((self._amplitude[1] * self._sizes[:-1]) @ self._direction[0][:-1])
+
+    @property
+    def _unit(self) -> float:
+        return self._amplitude[0] or 1.0
+
+    @property
+    def values(self) -> Array:
+        return np.array([self._slope / self._unit])
+
+    @lazy
+    def rows(self) -> Array:
+        t, m = self._direction
+        _, _, across, bend = self._amplitude
+        step = t * self._sizes
+        ahead, behind = (self._moved(s * _STEP * step) for s in (1.0, -1.0))
+        row = -m @ (ahead - behind) / (2.0 * _STEP)
+        row[: len(across)] += bend * float(across @ step[:-1]) * across
+        return row[None] / self._unit
+
+    def _moved(self, by: Array) -> Array:
+        """Derivatives of R by the coefficients and all names, beside."""
+        state, name = self.state, self.names[0]
+        omega, values = state.omega, dict(state.values)
+        if name == "omega":
+            omega += by[-1]
+        else:
+            values[name] += by[-1]
+        moved = state.balance.at(state.x + state.balance.shaped(by[:-1]), omega, values)
+        return np.column_stack((moved.jacobian, *(moved.residual_by(one) for one in self.names)))
+
+    def renewed(self) -> Ridge:
+        value = self.state.omega if self.names[0] == "omega" else self.state.values[self.names[0]]
+        sizes = self._sizes[:-1], abs(value) or self.of.along
+        border = self._direction[0] * np.append(np.ones(len(sizes[0])), self.of.along / sizes[1])
+        return replace(self.of, border=border / length(border), along=sizes[1])
