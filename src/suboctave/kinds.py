@@ -70,9 +70,9 @@ KINDS: dict[str, Kind] = {
         "phase resonance", "H", "#56B4E9", equations="phase_resonance:PhaseResonance", choices={"harmonic": 1.0},
         line="#D55E00",
     ),
-    "ridge": Kind("ridge", (6, 1, 0), "#56B4E9", equations="ridge:Ridge", choices={}, line="#0072B2"),
+    "ridge": Kind("ridge", (6, 1, 0), "#56B4E9", equations="ridge:Ridge", choices={}, line="#CC79A7"),
     "harmonic_ridge": Kind(
-        "ridge of a harmonic", (8, 1, 0), "#56B4E9", equations="ridge:Ridge", choices={"harmonic": 1.0}, line="#0072B2"
+        "ridge of a harmonic", (8, 1, 0), "#56B4E9", equations="ridge:Ridge", choices={"harmonic": 1.0}, line="#CC79A7"
     ),
     "extremum": Kind("extremum of a parameter along a curve of bifurcations", "d", _WHITE, 0.9, "extremum"),
     "CP": Kind("cusp", "P", "#0072B2", 1.1),
