@@ -7,7 +7,7 @@ matrix is a product of exponentials of all modes, whatever their frequencies are
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from scipy.linalg import expm
+from scipy.linalg import eig, expm
 from scipy.optimize import brentq, linear_sum_assignment
 
 import suboctave as so
@@ -93,9 +93,11 @@ def before(state):
     """Multipliers along the motion as it stands, with the errors of propagation alone."""
     motion = monodromy._Linearised(state)
     mu, errors = motion.others()
-    own = np.linalg.eigvals(motion.before)
-    least = (1e-8 + motion.neglected) * max(1.0, np.abs(own).max(initial=0.0))
-    return motion, np.concatenate((own, mu)), np.concatenate((np.full(len(own), least), errors))
+    own, left, right = eig(motion.before, left=True, right=True)
+    # a matrix that changes moves an eigenvalue by so many times as much
+    condition = 1.0 / np.abs(np.sum(left.conj() * right, axis=0))
+    least = (1e-8 + condition * motion.neglected) * max(1.0, np.abs(own).max(initial=0.0))
+    return motion, np.concatenate((own, mu)), np.concatenate((least, errors))
 
 
 @pytest.mark.parametrize("kind", ["stiffness-proportional", "modal", "full"])

@@ -43,7 +43,7 @@ _APART = 0.3
 _UNCOUPLED = 1e-28
 #: condition of eigenvectors beyond which rounding would be seen in multipliers: contacts are then followed by panels
 _PARALLEL = 1e6
-_EPS = float(np.finfo(float).eps)
+_EPS, _TINY = float(np.finfo(float).eps), float(np.finfo(float).tiny)
 
 
 class Blocks(NamedTuple):
@@ -71,9 +71,14 @@ class Blocks(NamedTuple):
         R, the sum of these, if this block is the first without states, (B + 1, G, G).
     coupling
         G B and G L B of every block, (B, 2, 2 G G), by q and q', channels that read and that drive.
-    reach, stiffening
-        How far an impulse in a channel moves it by the blocks before each, (B + 1, G), and how much one of stiffness
-        adds to squared rates, (B + 1, G).
+    sizes
+        How far a force in a channel drives a block, and how much of a block a channel reads, (2, B, G).
+    turning
+        Largest entry of G B, relative to these: zero for a mode, and -1 for blocks of a single state.
+    stiffening
+        How much an impulse of stiffness in a channel adds to squared rates by the blocks before each, (B + 1, G).
+    shifting
+        How far stiffness and damping of a channel shift the exponents, to first order, (2, S, G); of double ones zero.
     coupled
         How many blocks take part.
     active
@@ -93,8 +98,10 @@ class Blocks(NamedTuple):
     flexibility: Array
     flexible: Array
     coupling: Array
-    reach: Array
+    sizes: Array
+    turning: Array
     stiffening: Array
+    shifting: ComplexArray
     coupled: int
     active: np.ndarray
     rounding: float
@@ -239,21 +246,42 @@ def _arranged(parts: _Parts, n: int, left: Array, right: Array, active: np.ndarr
     first = np.concatenate(([0], np.cumsum([len(parts.matrices[i]) for i in order]))).astype(np.int64)
     into = np.concatenate([driven[i] for i in order])
     out = np.concatenate([read[i] for i in order], axis=2)
-    reach, stiffening = np.zeros((2, len(order) + 1, groups))
-    sizes = [[np.linalg.norm(driven[i], axis=0) * np.linalg.norm(part, axis=1) for part in read[i]] for i in order]
-    reach[1:], stiffening[1:] = np.cumsum(sizes, axis=0).swapaxes(0, 1)
+    driving = np.array([np.linalg.norm(driven[i], axis=0) for i in order])
+    reading = np.array([np.linalg.norm(read[i], axis=2) for i in order])
+    sizes, stiffening = np.stack((driving, reading[:, 0])), np.zeros((len(order) + 1, groups))
+    stiffening[1:] = np.cumsum(driving * reading[:, 1], axis=0)
     coupling = np.zeros((len(order), 2, 2, groups, groups))
     for b, i in enumerate(order):
         coupling[b, 0], coupling[b, 1] = read[i] @ driven[i], read[i] @ parts.matrices[i] @ driven[i]
+    most = np.maximum(sizes.max(axis=2, initial=0.0).prod(axis=0), _TINY)
+    turning = np.where(np.diff(first) > 1, np.abs(coupling[:, 0, 0]).max(axis=(1, 2), initial=0.0) / most, -1.0)
     decays = np.array([parts.exponents[i].real.max() for i in order])
+    shifting = np.concatenate(
+        [_shifting(coupling[b, 0], coupling[b, 1], parts.exponents[i]) for b, i in enumerate(order)], axis=1
+    )
     steepest = [0.0, *np.minimum.accumulate(decays).tolist()]
     exponents = np.concatenate([parts.exponents[i] for i in order])
     flexible = np.zeros((len(order) + 1, groups, groups))
     flexible[:-1] = flexibility[::-1].cumsum(axis=0)[::-1]
     return Blocks(
         motion, first, rates[order], decays, steepest, exponents, into, np.ascontiguousarray(out), flexibility,
-        flexible, coupling.reshape(len(order), 2, -1), reach, stiffening, int(coupled.sum()), active, rounding,
+        flexible, coupling.reshape(len(order), 2, -1), sizes, turning, stiffening, shifting,
+        int(coupled.sum()), active, rounding,
     )  # fmt: skip
+
+
+def _shifting(first: Array, second: Array, exponents: ComplexArray) -> ComplexArray:
+    """`Blocks.shifting` of a block with these exponents, (2, b, G); first, second: G B and G L B, (2, G, G) each.
+
+    With `L' = L + B k G`, the trace of L' grows by that of B k G, and half that of L'^2 by that of L B k G.
+    """
+    trace, product = np.diagonal(first, axis1=1, axis2=2), np.diagonal(second, axis1=1, axis2=2)
+    if len(exponents) == 1:
+        return trace[:, None, :].astype(complex)
+    apart = exponents[0] - exponents[1]
+    if apart.imag == 0.0:
+        return np.zeros((2, 2, trace.shape[1]), dtype=complex)
+    return np.stack((product - exponents[1] * trace, exponents[0] * trace - product), axis=1) / apart
 
 
 class Form(NamedTuple):

@@ -7,9 +7,11 @@ the constant stiffnesses of contacts in them:
     y'' + C y' + K y = - sum_g left_g (k_g q_g + c_g q_g' + r_g),    q_g = right_g^T y,
 
 Blocks that are too fast for the motion follow the forces at once, like springs, and their multipliers are those of the
-free motion. That may move the others, by as much as contacts that set in later by the time such a block takes, and
-coupled neighbours by more: this bounds which blocks are meant, and belongs to the errors. Perturbations that decay
-while no channel acts need not be followed either: the period begins with the longest such time.
+motion with the means of stiffness and damping, to first order. How far that moves the others follows to first order
+from the spectra of stiffness and damping (`resolution.moved_without`): it decides which blocks are meant, and belongs
+to the errors, the more the less multipliers are apart. So does the share of the correction below that such blocks
+make. Perturbations that decay while no channel acts need not be followed either: the period begins with the longest
+such time.
 
 Here r is the force that the motion leaves unbalanced. All elements along one direction are one channel. An element with
 nodes of its own (`aft.general`), of force f(q, theta) along d_out, adds `d_out (f_ui d_i^T y + f_vi d_i^T y')` per
@@ -48,7 +50,14 @@ from scipy.linalg import lapack
 from suboctave.floquet.blocks import form_of, forms_along, in_blocks
 from suboctave.floquet.exponentials import TURNS, structure
 from suboctave.floquet.propagate import closed, march, multipliers_and_shifts, response
-from suboctave.floquet.resolution import ACCURACY, divided, longest_rest, states_needed, stretches
+from suboctave.floquet.resolution import (
+    ACCURACY,
+    divided,
+    longest_rest,
+    moved_without,
+    states_needed,
+    stretches,
+)
 from suboctave.floquet.result import FloquetResult
 from suboctave.floquet.structural import with_structural_damping
 from suboctave.floquet.time_mesh import (
@@ -139,6 +148,10 @@ class _Linearised:
         ]
         passages = np.concatenate(passed, axis=1) if passed else _NO_PASSAGES
         self._held = np.empty((2, len(self.active)))
+        self._moved = moved_without(
+            state.tangent_spectra, blocks.active, state.rate, blocks.exponents, blocks.first, blocks.sizes,
+            blocks.turning, blocks.coupled, (state.basis.harmonics + 0.5) * state.rate, sum(_NEGLECTED),
+        )  # fmt: skip
         events = events_along(self._motions, laws.pieces, laws.owner, passages, grid.zr, grid.zi)
         self.events = events[np.argsort(events[:, 0], kind="stable")]
         panels, start = panels_between(self.events, longest)
@@ -187,11 +200,9 @@ class _Linearised:
             laws.step_owner, laws.line, self.spans, self.path, self.law, self.base,
         )  # fmt: skip
         self._own.evaluate(self.path, self.law)
-        blocks, resolved = self._blocks, (self.state.basis.harmonics + 0.5) * self.state.rate
-        self._dynamic, self.neglected, self.coupled = states_needed(
-            self.spans, self._forces, self.law, self.base, self.active, self._held, blocks.rates, blocks.decays,
-            blocks.flexibility, blocks.reach, blocks.coupled, resolved, _NEGLECTED,
-        )  # fmt: skip
+        self._dynamic, self.neglected, self._unbalanced, self.coupled = states_needed(
+            self.spans, self._forces, self.law, self.base, self.active, self._held, self._moved, _NEGLECTED
+        )
         self._contacts()
 
     def _divided(self, panels: Array, start: np.ndarray) -> tuple[Array, np.ndarray]:
@@ -245,15 +256,17 @@ class _Linearised:
         return self._blocks.rounding + self._turned
 
     def others(self) -> tuple[ComplexArray, Array]:
-        """Multipliers of what has no states at the beginning, as if no channel acted, and how far those may move
-        them.
+        """Multipliers of what has no states at the beginning, as if channels had their mean stiffness and damping, and
+        how far these may move them.
         """
         blocks = self._blocks
         if self.size == len(blocks.exponents):
             return _NO_MULTIPLIERS
         without = np.ones(len(blocks.exponents), dtype=bool)
         without[self._kept] = False
-        exponents = blocks.exponents[without] * (2.0 * math.pi / self.state.rate)
+        means = self.state.tangent_spectra[:, blocks.active, 0].real
+        exponents = blocks.exponents + blocks.shifting[0] @ means[0] + blocks.shifting[1] @ means[1]
+        exponents = exponents[without] * (2.0 * math.pi / self.state.rate)
         mu, flexible = np.exp(exponents), np.abs(blocks.flexibility).sum(axis=2)
         by_stiffness, by_damping = (flexible @ held for held in self._held)
         by_forces = 2.0 * blocks.rates * (by_stiffness + blocks.rates * by_damping)
@@ -262,7 +275,8 @@ class _Linearised:
         return mu, np.abs(mu) * moved + math.exp(_FORGOTTEN)
 
     def multipliers(self, weight: float) -> tuple[ComplexArray, Array, float]:
-        """Multipliers, how far the correction has moved them, and the share of it that was taken.
+        """Multipliers, how far the correction has moved them, and blocks without states may, (2, N), and the share of
+        the correction that was taken.
 
         weight: share of its part along the direction of the real multiplier nearest to +1.
         """
@@ -277,10 +291,18 @@ class _Linearised:
             )  # fmt: skip
         law, kick = self._changed(change)
         after = self._march(law, kick, self.size)[self._kept]
-        mu, shift = np.empty(self.size, dtype=complex), np.empty(self.size)
+        mu, shift = np.empty(self.size, dtype=complex), np.empty((2, self.size))
         real, imaginary, left, right, _ = lapack.dgeev(after, 1, 1)
-        multipliers_and_shifts(real, imaginary, left, right, after, self.before, mu, shift)
+        multipliers_and_shifts(
+            real, imaginary, left, right, after, self.before, self.neglected, self._doubt(change, share), mu, shift
+        )
         return mu, shift, share
+
+    def _doubt(self, change: Array, share: float) -> float:
+        """Share of a correction that blocks without states make, as springs, of forces that turn faster than these."""
+        size = float(np.abs(change[:, 0]).max(initial=0.0))
+        alone = share * self._unbalanced * float(np.abs(self._blocks.flexible[self._dynamic]).max(initial=0.0))
+        return min(1.0, alone / size) if size > 0.0 else 0.0
 
 
 class Channels:
@@ -506,18 +528,18 @@ def _with_states(motion: _Linearised) -> tuple[ComplexArray, Array]:
     """Multipliers and errors of the blocks that have states."""
     mu, shift, share = motion.multipliers(1.0)
     # there are few: numbers are quicker than arrays
-    values, shifts = mu.tolist(), shift.tolist()
+    values, shifts = mu.tolist(), shift[0].tolist()
     largest = max(1.0, abs(values[0]))
     # that nearest to +1 before the correction, which may have carried it off
     nearest = min(range(len(values)), key=lambda i: abs(1.0 - values[i]) - shifts[i])
     distance = abs(1.0 - values[nearest])
     moved = shifts[nearest] / share if share > 0.0 else math.inf
     if moved > _DOUBTFUL * distance:
-        mu, shift, share = _beside_fold(motion, moved, shift)
+        mu, shift, share = _beside_fold(motion, moved)
     # where the correction had to be cut, the motion is not near enough to a true one to say much
     cut = 1.0 / share - 1.0 if share > 0.0 else math.inf
-    least = (ACCURACY if motion.coupled else 0.0) + motion.rounding + motion.neglected + cut
-    return mu, shift * (1.0 + cut) + least * largest
+    least = (ACCURACY if motion.coupled else 0.0) + motion.rounding + cut
+    return mu, shift[0] * (1.0 + cut) + shift[1] + least * largest
 
 
 def _no_numbers(state: BalanceState, count: int) -> FloquetResult:
@@ -530,16 +552,17 @@ def _no_numbers(state: BalanceState, count: int) -> FloquetResult:
     return FloquetResult.inapplicable(count, "monodromy", "The linearised motion is not finite")
 
 
-def _beside_fold(motion: _Linearised, moved: float, shift: Array) -> tuple[ComplexArray, Array, float]:
+def _beside_fold(motion: _Linearised, moved: float) -> tuple[ComplexArray, Array, float]:
     """Multipliers, shifts and share where a correction may have no meaning, as it does at a limit point.
 
     moved: shift of the multiplier nearest to +1 by the whole correction.
     """
     gap = float(np.abs(1.0 - np.linalg.eigvals(motion.before)).min())
     ratio = 2.0 * moved / gap if gap > 0.0 else math.inf
-    mu, kept, share = motion.multipliers(1.0 / (1.0 + min(ratio, 1e6) ** 4))
+    mu, shift, share = motion.multipliers(1.0 / (1.0 + min(ratio, 1e6) ** 4))
     left_out = moved * min(1.0, 2.0 / math.sqrt(ratio)) if math.isfinite(moved) else math.inf
-    return mu, kept + 2.0 * left_out, share
+    shift[0] += 2.0 * left_out
+    return mu, shift, share
 
 
 def projector(phi: Array) -> Array:

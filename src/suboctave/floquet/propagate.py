@@ -337,9 +337,10 @@ def closed(whole, kept, phi, start):
 
 
 @kernel(fastmath=_FAST, error_model="numpy")
-def multipliers_and_shifts(real, imaginary, left, right, phi, before, mu, moved):
+def multipliers_and_shifts(real, imaginary, left, right, phi, before, neglected, doubt, mu, moved):
     """Eigenvalues of phi (N, N) by descending modulus into `mu` (N,), and how far each may have moved from those of
-    `before`, and by rounding of the entries, into `moved` (N,).
+    `before`, and by rounding of the entries, and by a matrix of the size `neglected`, relative to the largest, and a
+    share `doubt` of what differs from `before`, into `moved` (2, N).
 
     real, imaginary (N,), left, right (N, N): as LAPACK's geev has them, conjugate vectors as real and imaginary parts.
     """
@@ -353,10 +354,12 @@ def multipliers_and_shifts(real, imaginary, left, right, phi, before, mu, moved)
             norm += phi[i, j] ** 2
     # a double multiplier moves like the square root of a perturbation: that bounds the first-order estimate
     most = math.sqrt((math.sqrt(change) + _ROUNDING * math.sqrt(norm)) * largest)
+    unknown = neglected * largest + doubt * math.sqrt(change)
+    furthest = math.sqrt(unknown * largest)
     v, turned, length = np.empty(size), np.zeros(size), np.empty(size)
     for j in range(size):
         if imaginary[j] < 0.0:
-            moved[j] = moved[j - 1]
+            moved[0, j], moved[1, j] = moved[0, j - 1], moved[1, j - 1]
             continue
         more = j + 1 if imaginary[j] > 0.0 else j
         turn = 0.0 if more == j else 1.0
@@ -377,9 +380,11 @@ def multipliers_and_shifts(real, imaginary, left, right, phi, before, mu, moved)
             by_change += u * complex(x, y)
             by_rounding += abs(u) * rounded
         first = (abs(by_change) + _ROUNDING * by_rounding) / abs(scale) if abs(scale) > 0.0 else np.inf
-        moved[j] = min(first, most) + 1e-14
+        moved[0, j] = min(first, most) + 1e-14
+        moved[1, j] = min(unknown / abs(scale), furthest) if abs(scale) > 0.0 else furthest
     for k in range(1, size):
         while k > 0 and abs(mu[k - 1]) < abs(mu[k]):
             mu[k - 1], mu[k] = mu[k], mu[k - 1]
-            moved[k - 1], moved[k] = moved[k], moved[k - 1]
+            for part in range(2):
+                moved[part, k - 1], moved[part, k] = moved[part, k], moved[part, k - 1]
             k -= 1

@@ -13,6 +13,8 @@ import numpy as np
 from suboctave.compiled import kernel
 from suboctave.floquet.time_mesh import ORDER, WEIGHTS
 
+#: sums may be reordered; infinities keep their meaning
+_FAST = {"reassoc", "contract", "nsz"}
 _TINY = float(np.finfo(float).tiny)
 #: what panels are made for: errors of multipliers, and share of what blocks without states may move them
 ACCURACY, _FINER = 1e-8, 0.01
@@ -20,6 +22,10 @@ ACCURACY, _FINER = 1e-8, 0.01
 MOST = 20000
 #: logarithm of the share of a block in a force below which it counts no more
 _UNSEEN = math.log(1e-9)
+#: entries of G B, relative to the largest that they may be, that a mode has by rounding
+_MODE = 1e-9
+#: multipliers up to this count as zero: that of a block may be wrong
+_GONE = 1e-6
 #: numbers of blocks with states among many: what belongs to each of them serves other motions as well
 _LEVELS = 12
 
@@ -71,97 +77,151 @@ def longest_rest(spans, law, base, active, start):
 
 
 @kernel()
-def with_states(most, changes, held, rates, decays, flexibility, reach, coupled, resolved, time, tolerable):
-    """How many blocks have states, and how far the others may move multipliers, relative to the largest.
-
-    A block without states follows a force F that sets in at once, and not with a delay of 1/rate: what that makes is an
-    impulse `F / rate` of its share in the force, k R k q / rate, whenever a contact begins or ends. Two neighbours, one
-    with states and one without, are coupled by forces besides, and the closer they lie the more that does.
-
-    most (3, G, G): largest products of the stiffnesses of two channels at one time, of one's stiffness and the other's
-    damping, and of two dampings; changes (G,): how often each comes and goes; held (2, G): integrals of stiffness and
-    damping over the period, which takes `time`; rates, ..., reach: see `blocks.Blocks`; resolved: a rate up to which
-    all blocks have states; tolerable: how far the others may move multipliers.
+def _sizes(tangents, active):
+    """Sizes of the Fourier coefficients -top .. top of the channels `active`, and of the next one if they go on as
+    those of a jump do, (2, G, 2 top + 2).
     """
-    groups = changes.shape[0]
-    dynamic, neglected, last = coupled, 0.0, 0.0
-    impulse, shifts = np.zeros(groups), np.zeros(2)
+    top = tangents.shape[2] - 1
+    sizes = np.zeros((2, active.shape[0], 2 * top + 2))
+    for part in range(2):
+        for g in range(active.shape[0]):
+            squares = 0.0
+            for n in range(top + 1):
+                size = abs(tangents[part, active[g], n])
+                sizes[part, g, top - n] = sizes[part, g, top + n] = size
+                if 2 * n > top:
+                    squares += (n * size) ** 2 / (top - top // 2)
+            sizes[part, g, 2 * top + 1] = math.sqrt(squares) / (top + 1.0)
+    return sizes
+
+
+@kernel(fastmath=_FAST, error_model="numpy")
+def _couplings(spectra, sizes, i, b, slow, w, stiff, moving, back):
+    """Squares of what couples a motion of block i, of the rate `slow`, and block b, of the rate w, by all coefficients
+    of stiffness, and by those of damping as far as it reads the rate of b, into stiff and moving (2 top + 2,); returns
+    the sum of the latter. back: room to work in.
+    """
+    total = 0.0
+    for n in range(stiff.shape[0]):
+        stiff[n] = moving[n] = back[n] = 0.0
+    for g in range(spectra.shape[1]):
+        reads, drives = sizes[0, i, g] * sizes[1, b, g], sizes[0, b, g] * sizes[1, i, g]
+        for n in range(stiff.shape[0]):
+            stiff[n] += reads * spectra[0, g, n]
+            moving[n] += reads * spectra[1, g, n]
+            back[n] += drives * (spectra[0, g, n] + slow * spectra[1, g, n])
+    for n in range(stiff.shape[0]):
+        stiff[n] *= back[n]
+        moving[n] *= w * back[n]
+        total += moving[n]
+    return total
+
+
+@kernel(fastmath=_FAST, error_model="numpy")
+def _answers(stiff, own, nu, rate, w, decay, width):
+    """Real and imaginary part of the sum of couplings times `1 - H(s + i n omega) / H(0)` for a mode."""
+    real = imaginary = 0.0
+    top = stiff.shape[0] // 2 - 1
+    for n in range(2 * top + 1):
+        s = nu + (n - top) * rate
+        x, y, square, turn = w * w - s * s, width * s, s * s + own, 2.0 * decay * s
+        part = stiff[n] / (x * x + y * y)
+        real -= part * (square * x - turn * y)
+        imaginary += part * (square * y + turn * x)
+    return real, imaginary
+
+
+@kernel(fastmath=_FAST, error_model="numpy")
+def _shift(stiff, moving, damped, slow, fast, rate, turning):
+    """What a block of the exponent `fast` adds to the exponent `slow` if it has no states; stiff, moving: see
+    `_couplings`; damped: whether any of the latter is there; turning: see `blocks.Blocks`.
+    """
+    top, own, nu = stiff.shape[0] // 2 - 1, slow.real * slow.real, abs(slow.imag)
+    w, decay, apart = abs(fast), abs(fast.real), abs(fast.real - slow.real)
+    # at resonance the two repel each other
+    near = top + min(top + 1, max(0, round((w - nu) / rate)))
+    width = 2.0 * math.hypot(apart, math.sqrt(stiff[near] + moving[near])) + _TINY
+    real = imaginary = other = 0.0
+    if 0.0 <= turning < _MODE and not damped:
+        real, imaginary = _answers(stiff, own, nu, rate, w, decay, width)
+    else:
+        for n in range(2 * top + 1):
+            s = nu + (n - top) * rate
+            size = math.sqrt(s * s + own)
+            if turning < 0.0:
+                lag = size / max(abs(s), apart, _TINY)
+            else:
+                lag = size * (size + 2.0 * decay + w * turning) / max(math.hypot(w * w - s * s, width * s), _TINY)
+            other += stiff[n] * lag + moving[n] * size / w * (lag + 1.0)
+    # beyond: an integral, and at resonance what is left of the block after a period
+    last = (top + 0.5) * rate
+    jump = (top + 1.0) * (top + 1.0) * rate / w * (stiff[2 * top + 1] + moving[2 * top + 1])
+    real += jump * math.log((last + w) / max(abs(last - w), 0.5 * rate))
+    if w > last:
+        other += jump * 2.0 * math.pi * (nu / w + 1.0 / math.expm1(min(math.pi * width / rate, 50.0)))
+    return (math.hypot(real, imaginary) + other) / w
+
+
+@kernel()
+def moved_without(tangents, active, rate, exponents, first, sizes, turning, coupled, resolved, most):
+    """How far all blocks from each one on move multipliers of those before it if they have no states, (B + 1,);
+    infinite where that is more than `most`.
+
+    A block that follows forces like a spring answers them at every frequency as at zero. A motion with the exponent s
+    makes forces at `s + i n omega` by the Fourier coefficients k_n of the stiffness, which adds to s
+
+        sum_n l k_n (H(s + i n omega) - H(0)) k_n r,    H(s) - H(0) = s ((s - tr L) R - G B) / ((s - L) (s - L*)),
+
+    H the response of the block without states, to first order: of the size `(|s| / |L|)^2` for slow forces, and at
+    resonance what couples the two and no more. Frequencies below and above that of a mode act against each other.
+    Behind the last coefficient that is known those of a stiffness that jumps follow. A block without states has no rate
+    either, that damping would read.
+
+    tangents (2, C, top + 1): Fourier coefficients of stiffness and damping; active (G,): the channels that act; rate:
+    omega; exponents, first, sizes, turning, coupled: see `blocks.Blocks`; resolved: a rate up to which all blocks have
+    states; most: a limit.
+    """
+    spectra, period = _sizes(tangents, active), 2.0 * math.pi / rate
+    moved, shifts = np.full(coupled + 1, np.inf), np.zeros(coupled)
+    room = np.empty((3, spectra.shape[2]))
+    stiff, moving, back = room[0], room[1], room[2]
+    moved[coupled] = 0.0
     for b in range(coupled - 1, -1, -1):
-        if not rates[b] > resolved:
+        fast, worst = exponents[first[b]], 0.0
+        w = abs(fast)
+        if not w > resolved:
             break
-        much = 0.0
-        for g in range(groups):
-            for h in range(groups):
-                both = most[0, g, h] + rates[b] * (most[1, g, h] + rates[b] * most[2, g, h])
-                impulse[g] += changes[h] * both * abs(flexibility[b, g, h]) / rates[b]
-            much += impulse[g] * reach[b, g]
-        if not much <= tolerable:
+        for i in range(b):
+            slow = exponents[first[i]]
+            left = math.exp(min(0.0, slow.real) * period)
+            if left > _GONE:
+                damped = _couplings(spectra, sizes, i, b, abs(slow), w, stiff, moving, back) > 0.0
+                shifts[i] += _shift(stiff, moving, damped, slow, fast, rate, turning[b])
+                worst = max(worst, left * math.expm1(min(shifts[i] * period, 1.0)))
+        if not worst <= most:
             break
-        between = 0.0
-        if b > 0:
-            for i in range(2):
-                shifts[i] = 0.0
-                for g in range(groups):
-                    change = rates[b - i] * (held[0, g] + rates[b - i] * held[1, g])
-                    shifts[i] += change * abs(flexibility[b - i, g, g])
-            apart = (rates[b] - rates[b - 1]) * time
-            between = math.exp(min(0.0, decays[b] * time)) * shifts[0] * shifts[1] / max(apart, 1e-3 * shifts[0], _TINY)
-        if b % max(1, coupled // _LEVELS) == 0 and much + between <= tolerable:
-            dynamic, neglected, last = b, much, between
-    return dynamic, neglected + last
+        moved[b] = worst
+    return moved
 
 
 @kernel()
-def _tangents_met(law, base, active, panels):
-    """Of the stiffness and damping of channels on panels the `most` and `changes` of `with_states`."""
-    groups, m = active.shape[0], ORDER
-    now, before, largest = np.zeros((2, groups)), np.zeros((2, groups)), np.zeros((2, groups))
-    most, changed = np.zeros((3, groups, groups)), np.zeros((2, groups))
-    for turn in range(panels + 1):
-        p = turn % panels
-        for g in range(groups):
-            now[0, g] = now[1, g] = 0.0
-            for j in range(p * (m - 1), p * (m - 1) + m):
-                now[0, g] = max(now[0, g], abs(law[active[g], 1, j] + base[active[g], p]))
-                now[1, g] = max(now[1, g], abs(law[active[g], 2, j]))
-            for part in range(2):
-                largest[part, g] = max(largest[part, g], now[part, g])
-                changed[part, g] += abs(now[part, g] - before[part, g]) if turn > 0 else 0.0
-                before[part, g] = now[part, g]
-        for g in range(groups):
-            for h in range(groups):
-                most[0, g, h] = max(most[0, g, h], now[0, g] * now[0, h])
-                most[1, g, h] = max(most[1, g, h], now[0, g] * now[1, h] + now[1, g] * now[0, h])
-                most[2, g, h] = max(most[2, g, h], now[1, g] * now[1, h])
-    changes = np.zeros(groups)
-    for g in range(groups):
-        for part in range(2):
-            if largest[part, g] > 0.0:
-                changes[g] = max(changes[g], changed[part, g] / largest[part, g])
-    return most, changes
-
-
-@kernel()
-def states_needed(
-    spans, forces, law, base, active, held, rates, decays, flexibility, reach, coupled, resolved, limits
-):  # fmt: skip
-    """What `with_states` says of a motion on panels with dt/ds = spans (P, m), and whether any channel acts.
+def states_needed(spans, forces, law, base, active, held, moved, limits):
+    """How many blocks have states on panels with dt/ds = spans (P, m), how far the others may move multipliers,
+    relative to the largest, the largest force that the motion leaves unbalanced, and whether any channel acts.
 
     forces (C, .): Fourier coefficients of all channels; law, base (C, P): forces, stiffness and damping at the nodes,
-    and what is added to the stiffness on every panel; active: the channels that act; held, ..., resolved: see
-    `with_states`. limits: how far blocks without states may move multipliers, and how much further where the motion
-    leaves all of a force unbalanced.
+    and what is added to the stiffness on every panel; active: the channels that act; held (2, G): integrals of
+    stiffness and damping over the period; moved: see `moved_without`. limits: how far blocks without states may move
+    multipliers, and how much further where the motion leaves all of a force unbalanced.
     """
     panels, m = spans.shape
-    left, whole, time, acting = 0.0, _TINY, 0.0, False
-    most, changes = _tangents_met(law, base, active, panels)
+    left, whole, acting = 0.0, _TINY, False
     for g in range(active.shape[0]):
         held[0, g] = held[1, g] = 0.0
     for p in range(panels):
         length = 0.0
         for j in range(m):
             length += WEIGHTS[j] * spans[p, j]
-        time += length
         for g in range(active.shape[0]):
             k = c = 0.0
             for j in range(p * (m - 1), p * (m - 1) + m):
@@ -177,10 +237,14 @@ def states_needed(
         whole = max(whole, size)
         acting = acting or held[0, g] > 0.0 or held[1, g] > 0.0
     tolerable = limits[0] + limits[1] * min(1.0, left / whole)
-    dynamic, neglected = with_states(
-        most, changes, held, rates, decays, flexibility, reach, coupled, resolved, time, tolerable
-    )
-    return dynamic, neglected, acting
+    coupled = moved.shape[0] - 1
+    dynamic = coupled
+    for b in range(coupled - 1, -1, -1):
+        if not moved[b] <= tolerable:
+            break
+        if b % max(1, coupled // _LEVELS) == 0:
+            dynamic = b
+    return dynamic, moved[dynamic], left, acting
 
 
 @kernel()

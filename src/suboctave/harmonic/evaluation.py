@@ -210,6 +210,17 @@ class BalanceState:
         force: ComplexArray = self._spectra[0]
         return force
 
+    @property
+    def tangent_spectra(self) -> ComplexArray:
+        """Fourier coefficients of stiffness and damping along every input of every channel, (2, Q, top + 1)."""
+        balance = self.balance
+        shared: ComplexArray = self._spectra[1:, : len(balance.groups)]
+        if not balance.own:
+            return shared
+        own = [channel.spectra[1:].reshape(-1, channel.count, balance.top + 1) for channel in self.own_channels]
+        own = [np.concatenate((part, np.zeros((2 - len(part), *part.shape[1:])))) for part in own]
+        return np.concatenate((shared, *own), axis=1)
+
     def _require_finite(self, spectra: ComplexArray, group: Group) -> None:
         if np.isfinite(spectra[:, 0]).all():
             return
