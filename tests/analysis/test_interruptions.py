@@ -20,6 +20,7 @@ VERBS = (
     ("basins", "bifurcation_diagram", "brute_force_diagram", "continue_branch", "find_isolas", "find_subharmonics")
     + ("frequency_response", "integrate", "isola_map", "locate_extremum", "lyapunov_exponents", "lyapunov_map")
     + ("periodic_orbit", "poincare_sections", "regime_map", "stepped_sine", "switch_branch", "track", "verify")
+    + ("design_margin", "phase_resonance", "track_peak")
 )
 
 
@@ -199,7 +200,7 @@ def test_the_verbs_that_may_take_long_have_a_time_limit():
     """`stability`, files, pictures and reports need no motion that is not known; everything else has one."""
     public = {name for name in so.__all__ if inspect.isfunction(getattr(so, name))}
     without = {"check_derivatives", "load", "read_measured", "stability", "write_report"}
-    without |= {"condense", "read_structure", "animate_shape", "to_pyvista", "write_vtu"}
+    without |= {"condense", "read_structure", "animate_shape", "to_pyvista", "write_vtu", "sensitivity"}
     without |= {name for name in public if name.startswith("plot")}
     assert public - without == set(VERBS)
 

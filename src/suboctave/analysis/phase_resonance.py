@@ -21,13 +21,14 @@ from suboctave.curves.starts import Harmonics
 from suboctave.curves.trace import BranchPoint
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.basis import Array, to_complex
-from suboctave.model.inputs import check_bounds, check_count, check_is_system, check_range
+from suboctave.model.inputs import check_bounds, check_count, check_is_system, check_range, timed
 from suboctave.model.system import System
 from suboctave.options import with_options
 from suboctave.results.branch import Branch, TrackedBranch
 
 
 @with_options(TrackOptions)
+@timed
 def phase_resonance(
     system: System,
     amplitude: str,

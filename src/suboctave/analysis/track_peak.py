@@ -10,11 +10,13 @@ from suboctave.analysis.options import TrackOptions
 from suboctave.analysis.track import track
 from suboctave.curves.trace import BranchPoint
 from suboctave.errors import InputError, is_number, shortened
+from suboctave.model.inputs import timed
 from suboctave.options import with_options
 from suboctave.results.branch import Branch, TrackedBranch
 
 
 @with_options(TrackOptions)
+@timed
 def track_peak(
     response: Branch | BranchPoint,
     parameter: str,
