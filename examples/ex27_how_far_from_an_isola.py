@@ -4,8 +4,10 @@ The rattling oscillator at a gap of 0.5 has an isolated resonance of twice the p
 parameter moves the gap at which it vanishes; the margin is the smallest change of damping, stiffness and load with
 which it is gone.
 
-    python ex27_how_far_from_an_isola.py
+    python ex27_how_far_from_an_isola.py [figure.png]
 """
+
+import sys
 
 import suboctave as so
 
@@ -21,6 +23,9 @@ margin = so.design_margin(isola, [strongest])
 together = so.design_margin(isola, ["zeta", "Kc", "p"])
 print(margin)
 print(together)
+
+if len(sys.argv) > 1:
+    isola.plot(sys.argv[1], values=[0.3, 0.5])
 
 # Shooting (no harmonic balance) puts the birth at this gap.
 assert abs(isola.born - 0.581107) < 2e-6, isola.born

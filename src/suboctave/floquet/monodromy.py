@@ -80,7 +80,7 @@ from suboctave.interruption import check_time
 
 #: how far blocks without states may move multipliers, and how much further where a force is left unbalanced altogether,
 #: which does more
-_NEGLECTED = (1e-4, 3e-4)
+_NEGLECTED = (3e-5, 3e-4)
 #: longest panels in units of the time scales of the forces, of the blocks as channels see them, and of the blocks; how
 #: much less these count if they are seen little, as a power: with them multipliers are good for 1e-8
 _LENGTHS = (1.2, 1.8, TURNS, 1.0 / 12.0)
