@@ -27,8 +27,9 @@ def track_peak(
 ) -> TrackedBranch:
     """The resonance peak of a response, where the amplitude is largest along it, followed in a second parameter.
 
-    Raze, Volvert & Kerschen, Mechanical Systems and Signal Processing (2024). Through limit points of the responses;
-    other extrema of the amplitude, such as an antiresonance, are followed from a point beside them.
+    Such curves are those of Raze, Volvert & Kerschen, Tracking amplitude extrema of nonlinear frequency responses using
+    the harmonic balance method (2024). They go through limit points of the responses; other extrema of the amplitude,
+    such as an antiresonance, are followed from a point beside them.
 
     Parameters
     ----------

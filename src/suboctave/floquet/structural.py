@@ -58,9 +58,11 @@ def with_structural_damping(state: BalanceState, viscous: FloquetResult) -> Floq
     groups += [pairs[i : i + _AT_ONCE] for i in range(0, len(pairs), _AT_ONCE)]
     moved = 0.0
     for group in groups:
-        if not len(group) or (moved and np.abs(decay[group]).min() > _BEYOND * moved and group[0] in pairs):
+        if not len(group):
             continue
         on_axis = bool(mu[group[0]].imag == 0.0)
+        if not on_axis and 0.0 < _BEYOND * moved < np.abs(decay[group]).min():
+            break
         # a pair is found with its conjugate
         others = [int(np.argmin(np.abs(mu - value.conjugate()))) for value in mu[group]]
         kappa, found = _roots(state, np.log(mu[group]) / (2j * math.pi), on_axis)

@@ -4,9 +4,9 @@ With t the direction of the response there, `R_X t_X + R_p t_p = 0`, and G the a
 
     h = G_X . t_X = 0,    [R_X R_p; c^T] t = [0; 1],
 
-c the direction at the last point: smooth through limit points, where p turns (adjoint form of Raze, Volvert &
-Kerschen, Mechanical Systems and Signal Processing 2024). G is the largest |x| of the observed displacement, or the
-amplitude of one of its harmonics. h changes by
+c the direction at the last point: smooth through limit points, where p turns. (Such curves: Raze, Volvert & Kerschen,
+Tracking amplitude extrema of nonlinear frequency responses using the harmonic balance method, 2024.) G is the largest
+|x| of the observed displacement, or the amplitude of one of its harmonics. h changes by
 
     dh = t_X . dG_X - m . d(R_X t_X + R_p t_p),    [R_X R_p; c^T]^T [m; .] = [G_X; 0],
 
@@ -35,7 +35,7 @@ _STEP = 1e-5
 @dataclass(frozen=True)
 class Ridge(Augmentation):
     """`dof` of the displacement; `multiple` of omega of its harmonic, None for the largest displacement; `border`, the
-    direction c in units of the motion's size and the parameter's value, `along`.
+    direction c in units of the motion's size and of the parameter's value at the start, `along`.
     """
 
     dof: int
@@ -161,7 +161,4 @@ class RidgeEquations(Equations):
         return np.column_stack((moved.jacobian, *(moved.residual_by(one) for one in self.names)))
 
     def renewed(self) -> Ridge:
-        value = self.state.omega if self.names[0] == "omega" else self.state.values[self.names[0]]
-        sizes = self._sizes[:-1], abs(value) or self.of.along
-        border = self._direction[0] * np.append(np.ones(len(sizes[0])), self.of.along / sizes[1])
-        return replace(self.of, border=border / length(border), along=sizes[1])
+        return replace(self.of, border=self._direction[0])
