@@ -40,7 +40,7 @@ from suboctave.curves.motion import MotionEvaluation, MotionProblem
 from suboctave.curves.starts import check_unknowns, harmonics_of, rule_of
 from suboctave.curves.trace import BranchPoint, Settings, Trace
 from suboctave.curves.tracked.follow import follow_tracked
-from suboctave.curves.tracked.start import Ranges, curve_through, inside, is_extremum, solved_start
+from suboctave.curves.tracked.start import Ranges, curve_through, inside, is_extremum, on_free_phase, solved_start
 from suboctave.errors import ConvergenceError, InputError, is_number, shortened, suggest
 from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.evaluation import BalanceState
@@ -119,7 +119,8 @@ def track(
     """
     item, through = begun(bifurcation, onto, options.get("observe"))
     turning = item.parameter_name if is_extremum(item) else ""
-    names, given = (_third if is_extremum(item) else _free)(item, parameter, bounds, omega)
+    further = is_extremum(item) or on_free_phase(item)
+    names, given = (_third if further else _free)(item, parameter, bounds, omega)
     ranges = {name: (min(ends), max(ends)) for name, ends in given.items()}
     kind = curve_onto(item, through)
     settings = _settings(item, turning, options)
@@ -180,16 +181,16 @@ def _third(item: TrackedEvent, parameter: Any, bounds: Any, omega: Any) -> tuple
     system = item.orbit.system
     if len(item.names) != 2:
         raise InputError(
-            f"this extremum lies on a curve in {', '.join(item.names)}: only those along curves in two parameters can "
-            "be followed in another one"
+            f"this {item.kind} lies on a curve in {', '.join(item.names)}: only those along curves in two parameters "
+            "can be followed in another one"
         )
     if not isinstance(parameter, str):
-        raise InputError(f"an extremum is followed in one more parameter: give its name, not {parameter!r}")
+        raise InputError(f"this {item.kind} is followed in one more parameter: give its name, not {parameter!r}")
     check_parameter(system, parameter)
     if parameter in item.names:
-        raise InputError(f"{parameter} is free on the curve of this extremum already: name a third parameter")
+        raise InputError(f"{parameter} is free on the curve of this {item.kind} already: name a third parameter")
     if omega is not None and item.names[0] != "omega":
-        raise InputError("omega= bounds omega where it is free, which it is not on the curve of this extremum")
+        raise InputError("omega= bounds omega where it is free, which it is not on the curve of this point")
     # a parameter of the extremum's curve keeps its range; if it is extreme, with as much again on both sides. That of
     # omega is often no more than where bifurcations were looked for
     kept: dict[str, Range] = {}
@@ -197,7 +198,7 @@ def _third(item: TrackedEvent, parameter: Any, bounds: Any, omega: Any) -> tuple
         known = Inherited(item).range(name)
         if known is not None and name != "omega":
             low, high = sorted(known)
-            more = high - low if name == item.parameter_name else 0.0
+            more = high - low if item.extreme and name == item.parameter_name else 0.0
             kept[name] = low - more, high + more
     ranges = _ranges(system, omega, kept, parameter, bounds)
     for name in (item.names[0], parameter):

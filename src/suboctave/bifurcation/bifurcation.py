@@ -382,4 +382,5 @@ class TrackedEvent(Bifurcation):
 
 def kind_of(item: Bifurcation) -> str:
     """Kind of the curve that is followed from a located point."""
-    return item.curve if isinstance(item, TrackedEvent) and item.kind not in TRACKED_KINDS else item.kind
+    own = isinstance(item, TrackedEvent) and (item.extreme or item.kind not in TRACKED_KINDS)
+    return item.curve if own and isinstance(item, TrackedEvent) else item.kind

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from suboctave.continuation.linear import Factor, cosine, distance, length
 from suboctave.continuation.newton import NewtonOptions, Solved, closely, correct, tangent
 from suboctave.continuation.problem import Array, Curve, Evaluation
@@ -103,3 +105,10 @@ def solved_again(
     u, along = curve.transfer(point.u, point.curve), curve.transfer(point.tangent, point.curve)
     row = weights * along
     return make_point(correct(curve, u, row / length(row), weights, newton, spare=spare), curve, along, point.arclength)
+
+
+def crossing_matrix(point: CurvePoint) -> Array:
+    """`[F_u; t]`, columns in scaled arclength, rows of unit length: singular where another curve of F = 0 crosses."""
+    matrix = np.vstack((point.evaluation.jacobian / point.weights, point.weights * point.tangent))
+    result: Array = matrix / np.linalg.norm(matrix, axis=1)[:, None]
+    return result

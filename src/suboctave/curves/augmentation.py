@@ -85,6 +85,11 @@ class Augmentation(ABC):
         return 0
 
     @property
+    def free_phase(self) -> bool:
+        """Whether a motion shifted in time is another solution: no load sets its phase, and omega is unknown."""
+        return False
+
+    @property
     def own(self) -> Augmentation:
         """That of the bifurcation alone, without the equation of an extremum."""
         return self

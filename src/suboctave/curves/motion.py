@@ -105,7 +105,7 @@ class MotionEvaluation:
         else:
             shaped = (state.residual + addition).reshape(state.x.shape)
             size = length(shaped * state.balance.scales()[1])
-        worst = size / max(state.balanced.scale, self.curve.least_force(state.omega), _TINY)
+        worst = size / max(state.balanced.scale, self.curve.least_force(state), _TINY)
         for value in self.equations.values.tolist():
             worst = max(worst, abs(value))
         return worst
@@ -203,9 +203,14 @@ class MotionProblem:
         """Index of one of the free parameters in u."""
         return self.balance.dimension + self.augmentation.extras + self.names.index(name)
 
-    def least_force(self, omega: float) -> float:
-        """Force that residuals are held against at least: that of a motion at rest."""
-        return _REST * omega**2 * self.reference
+    def least_force(self, state: BalanceState) -> float:
+        """Force that residuals are held against at least: that of a motion at rest; without a load, where the forces
+        of the structure alone may balance, that of the masses.
+        """
+        least = _REST * state.omega**2 * self.reference
+        if not self.augmentation.free_phase:
+            return least
+        return max(least, state.rate**2 * length(self.balance.column_weights * state.unknowns))
 
     def split(self, u: Array) -> tuple[Array, float, Mapping[str, float]]:
         """Coefficients (2 H + 1, size), omega and parameter values of a vector u."""
@@ -275,7 +280,7 @@ class MotionProblem:
         self.cache[balance.basis] = balance
         if balance.basis != self.balance.basis:
             augmentation = augmentation.resized(balance.basis, balance.size)
-        force = max(state.balanced.scale, self.least_force(state.omega))
+        force = max(state.balanced.scale, self.least_force(state))
         return replace(self, balance=balance, augmentation=augmentation, force=force, steps=self.steps + 1)
 
     def _basis(self, evaluation: MotionEvaluation, adaptive: AdaptiveHarmonics) -> HarmonicBasis:

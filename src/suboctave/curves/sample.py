@@ -213,7 +213,8 @@ class Sample:
     def coefficient(self) -> float:
         """What decides the normal form: psi . R''[phi, phi] / 2 of an LP, c3 of a PD, psi turned; nan for others."""
         augmentation = self.curve.augmentation.own
-        kind = augmentation.kind if isinstance(augmentation, SingularOperator) else Kind.FREE
+        known = isinstance(augmentation, SingularOperator) and not augmentation.free_phase
+        kind = augmentation.kind if known and isinstance(augmentation, SingularOperator) else Kind.FREE
         if kind is Kind.FREE:
             return float("nan")
         # gradients are those of -psi.J phi: `twist` is the g of normal forms, `bend` has the other sign

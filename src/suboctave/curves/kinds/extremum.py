@@ -64,6 +64,11 @@ class Extremal(Augmentation):
     def own(self) -> Augmentation:
         return self.base
 
+    @property
+    def free_phase(self) -> bool:
+        """As of the bifurcations."""
+        return self.base.free_phase
+
     def multiplier(self, rate: float, extra: Array) -> complex | None:
         return self.base.multiplier(rate, extra)
 

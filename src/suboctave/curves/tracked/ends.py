@@ -29,6 +29,7 @@ from suboctave.continuation.problem import Array
 from suboctave.curves.augmentation import Augmentation
 from suboctave.curves.junction import NOTHING_LEFT, doubled_size, subharmonic_share
 from suboctave.curves.kinds.branch_point import BranchPointUnfolded
+from suboctave.curves.kinds.limit_cycle import oscillating
 from suboctave.curves.kinds.singular import SingularOperator
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.sample import Sample
@@ -93,9 +94,13 @@ def end_between(a: Sample, b: Sample, newton: NewtonOptions, lopsided: bool = Tr
                 f"the branch points end after {a.where}: their unfolding is {beta:.1e} at "
                 f"{b.where}, the symmetry that forces them is broken there"
             )
+    if augmentation.free_phase and vanished(a, b):
+        return _in_its_parent(a, b)
     target = resonant_between(a, b)
     if target is not None:
         return _resonance(a, target == 0.5, newton)
+    if augmentation.free_phase:
+        return None
     if b.curve.balance.basis.nu == 1:
         return _symmetry_gained(a, b) if lopsided else None
     share = subharmonic_share(b.curve, b.point.u)
@@ -115,6 +120,29 @@ def end_between(a: Sample, b: Sample, newton: NewtonOptions, lopsided: bool = Tr
             "doublings of the parent motion, which solve the same equations"
         )
     return None
+
+
+def vanished(a: Sample, b: Sample) -> bool:
+    """Whether what makes the motions those of their family, an oscillation or its doubled part, has passed zero between
+    two neighbours: behind it they are the same once more, half a period later.
+    """
+    one, other = (_own_part(sample) for sample in (a, b))
+    size = min(len(one), len(other))
+    return float(np.vdot(one[:size], other[:size])) < 0.0
+
+
+def _own_part(sample: Sample) -> Array:
+    """The coefficients that a Hopf point, or the parent of doubled motions, does not have."""
+    part = oscillating(sample.state)
+    if sample.state.basis.nu % 2 == 0:
+        part[3::4], part[4::4] = 0.0, 0.0
+    return part
+
+
+def _in_its_parent(a: Sample, b: Sample) -> End:
+    if b.state.basis.nu % 2 == 0:
+        return End(f"the doubled part of the motions vanishes between {a.where} and {b.where}: in a period doubling")
+    return End(f"the oscillation vanishes between {a.where} and {b.where}: in a Hopf point")
 
 
 def resonant_between(a: Sample, b: Sample) -> float | None:
@@ -261,7 +289,7 @@ def _resonance(a: Sample, double: bool, newton: NewtonOptions) -> End:
     """The 1:1 or 1:2 resonance in which an NS curve ends, located on the LP, BP or PD curve through it."""
     order = 2 if double else 1
     ends = f"the curve ends in a 1:{order} resonance"
-    if a.curve.augmentation.turning:
+    if a.curve.augmentation.turning or a.curve.augmentation.free_phase:
         return End(f"{ends} beyond {a.where}")
     balance, name = a.curve.balance, a.curve.names[0]
     state = balance.at(a.state.x, a.state.omega, a.state.values)

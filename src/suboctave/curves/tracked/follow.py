@@ -19,7 +19,16 @@ from suboctave.curves.motion import CRITICAL_EVERY, MotionProblem
 from suboctave.curves.sample import Sample
 from suboctave.curves.trace import Settings, Trace, TrackedPoint
 from suboctave.curves.tracked.corners import beyond_corner
-from suboctave.curves.tracked.ends import End, comes_close, end_ahead, end_between, is_lopsided, points_before, rebased
+from suboctave.curves.tracked.ends import (
+    End,
+    comes_close,
+    end_ahead,
+    end_between,
+    is_lopsided,
+    points_before,
+    rebased,
+    vanished,
+)
 from suboctave.curves.tracked.events import LocatedEvent, StepWatch, as_event, events_between, refined
 from suboctave.curves.tracked.start import Ranges
 from suboctave.curves.tracked.tests import Extremum, tests_of
@@ -133,11 +142,13 @@ class _Tracker(Driver):
     def _clear(a: CurvePoint, b: CurvePoint) -> bool:
         """True if a step stays on its curve."""
         way = b.arclength - a.arclength
-        if b.orientation != a.orientation and way > _JUMP:
+        assert isinstance(b.curve, MotionProblem)
+        free = b.curve.augmentation.free_phase
+        if b.orientation != a.orientation and way > _JUMP and not free:
             return False
         if way > _NEAR_END and not comes_close(Sample(a), Sample(b)):
             return False
-        return keeps_subharmonics(a, b)
+        return keeps_subharmonics(a, b) or (free and vanished(Sample(a), Sample(b)))
 
     def _accept(self, point: CurvePoint) -> Ending | None:
         """Take a point in; why the curve ends there or before it, if it does."""

@@ -16,6 +16,7 @@ from suboctave.continuation.newton import null_row
 from suboctave.curves.augmentation import Augmentation
 from suboctave.curves.events.formulation import BORDERED, Formulation
 from suboctave.curves.kinds.extremum import BorderedExtremal, LimitPointExtremal
+from suboctave.curves.kinds.limit_cycle import CycleWith, LimitCycle
 from suboctave.curves.kinds.singular import SingularOperator
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.starts import own_linear_part, settled
@@ -44,6 +45,11 @@ def is_extremum(item: Any) -> TypeGuard[TrackedEvent]:
     return isinstance(item, TrackedEvent) and bool(item.extreme)
 
 
+def on_free_phase(item: Bifurcation) -> bool:
+    """Whether something is a bifurcation of motions of a free phase, which has a curve in three parameters."""
+    return isinstance(item, TrackedEvent) and item.kind in ("PD", "NS") and item.curve == LimitCycle.name
+
+
 def curve_through(
     item: Bifurcation,
     basis: HarmonicBasis,
@@ -63,7 +69,8 @@ def curve_through(
     x = orbit.basis.resized(orbit.x, basis)
     balance = HarmonicBalance(orbit.system, basis, linear=own_linear_part(orbit)).settle(x, orbit.omega)
     state = balance.at(x, orbit.omega)
-    augmentation, extra = formulation.equations(kind_of(item)).through(item, state, names)
+    equations = CycleWith if on_free_phase(item) else formulation.equations(kind_of(item))
+    augmentation, extra = equations.through(item, state, names)
     force = state.balanced.scale
     curve = MotionProblem(
         balance,
@@ -77,7 +84,7 @@ def curve_through(
         # nothing but a motion of unit size measures one at rest
         reference=0.0 if force > 0.0 else 1.0,
     )
-    curve.force = max(force, curve.least_force(orbit.omega))
+    curve.force = max(force, curve.least_force(state))
     return curve, curve.join(x, np.array([item.parameter(name) for name in names]), extra)
 
 

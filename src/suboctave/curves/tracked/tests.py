@@ -10,6 +10,8 @@
                       curves, as of NS points along a branch: a complex pair passes it
     NSNS              the same on NS curves
     LP, BP, PD, NS    the same on curves of motions that need no critical multiplier (`MOTION_KINDS`)
+    LP, BP            of motions of a free phase, where J_0 is singular all along: the last parameter turns; the
+                      orientation of the curve changes
 
 The multiplier or the pair that is critical all along the curve is not counted. Two real multipliers whose product
 passes one (a neutral saddle) stay where they are. (Kuznetsov, Elements of Applied Bifurcation Theory, 3rd ed., chapters
@@ -26,12 +28,13 @@ from itertools import product
 import numpy as np
 
 from suboctave.bifurcation.bordered import NullVectors, bordered, null_vectors, transversality
+from suboctave.continuation.point import crossing_matrix
 from suboctave.curves.kinds.singular import SingularOperator
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.sample import Sample
 from suboctave.errors import ConvergenceError
 from suboctave.floquet.symmetric import UNDAMPED, symmetric_functions
-from suboctave.harmonic.basis import ComplexArray
+from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.perturbation import Kind
 from suboctave.kinds import MOTION_KINDS
 
@@ -48,6 +51,8 @@ _CORRECTIONS, _KNOWN = 6, 1e-11
 #: distance of that kappa from the one of the multipliers, in the same units, at which it belongs to another pair, and
 #: of that pair's growth from that of the multipliers, as a share
 _STRAYED, _AGREES = 0.1, 0.25
+#: least singular value of a crossing matrix above which no curves cross
+_CROSSED = 1e-5
 #: logarithm of a pair's modulus up to which it may be on the unit circle
 _ON_IT = 0.03
 
@@ -125,6 +130,45 @@ class Extremum(CurveTest):
         """Whether the parameter stays as it is but for rounding."""
         weight = float(sample.point.weights[sample.curve.index(self.name)])
         return abs(sample.slopes[self.name] * weight) < _LEVEL
+
+
+@dataclass(frozen=True)
+class TurningPoint(Extremum):
+    """The limit point of motions of a free phase: their parameter turns."""
+
+    kind = "LP"
+
+
+@dataclass(frozen=True)
+class CurvesCross(CurveTest):
+    """Another curve of the same equations crosses: the orientation changes. Between neighbours by the bordered scalar
+    of the equations with the tangent as their last row, all rows of unit length; `borders`: its null vectors.
+    """
+
+    kind = "BP"
+    borders: tuple[Array, Array] | None = None
+
+    def value(self, sample: Sample) -> float:
+        if self.borders is None:
+            return sample.point.orientation
+        matrix, (left, right) = crossing_matrix(sample.point), self.borders
+        whole = np.block([[matrix, left[:, None]], [right[None], np.zeros((1, 1))]])
+        return float(np.linalg.solve(whole, np.eye(1, len(whole), len(matrix))[0])[-1])
+
+    def within(self, a: Sample, b: Sample) -> CurveTest:
+        u, _, vt = np.linalg.svd(crossing_matrix(b.point))
+        return replace(self, borders=(u[:, -1], vt[-1]))
+
+    def smooth(self, sample: Sample) -> tuple[float, float]:
+        sign, size = np.linalg.slogdet(crossing_matrix(sample.point))
+        return float(sign), float(size)
+
+    def genuine(self, sample: Sample) -> bool:
+        """See `CurveTest.genuine`; raises ConvergenceError where no curves cross."""
+        least = float(np.linalg.svd(crossing_matrix(sample.point), compute_uv=False)[-1])
+        if least > _CROSSED:
+            raise ConvergenceError("the orientation changes, and no curves cross: the curve may have jumped to another")
+        return True
 
 
 @dataclass(frozen=True)
@@ -327,12 +371,12 @@ def _census(mu: ComplexArray) -> tuple[int, int, int]:
     return int((np.abs(mu) > 1.0).sum()), int((real > 1.0).sum()) % 2, int((real < -1.0).sum()) % 2
 
 
-#: on curves of motions that need no critical multiplier
+#: on curves of motions that need no critical multiplier; of a free phase
+_CROSSINGS = (RealCrossing("PD", Kind.HALF), PairCrossing("NS"))
 _OF_MOTIONS = (
     LimitOrBranchPoint("LP", Kind.INTEGER),
     LimitOrBranchPoint("BP", Kind.INTEGER),
-    RealCrossing("PD", Kind.HALF),
-    PairCrossing("NS"),
+    *_CROSSINGS,
 )
 #: on curves of bifurcations; the first two for one DOF, which has two multipliers with a positive product: none is left
 #: that could pass +1 or -1, or be one of a pair
@@ -357,6 +401,10 @@ _OF_BIFURCATIONS: dict[Kind, tuple[CurveTest, ...]] = {
 def tests_of(curve: MotionProblem) -> tuple[CurveTest, ...]:
     """What to look for along a curve, by the kind of its bifurcations."""
     turns, own = tuple(Extremum(name) for name in curve.names), curve.augmentation.own
+    if own.free_phase:
+        if curve.augmentation.turning or own.name not in MOTION_KINDS:
+            return turns
+        return (*turns[:-1], TurningPoint(curve.name), CurvesCross(), *_CROSSINGS)
     if own.name in MOTION_KINDS:
         return (*turns, *_OF_MOTIONS)
     if not isinstance(own, SingularOperator):

@@ -1,0 +1,142 @@
+"""Limit cycles: motions that no load keeps going, whose frequency is unknown and whose phase is free.
+
+    R(X, omega, p) = 0,    <D Y, X> = 0
+
+Any motion shifted in time is one as well. The phase condition takes that whose distance from a reference Y is least, D
+the derivative by tau and < , > the product weighted by masses. Y is kept while the motions resemble it, so that a
+closed curve comes back to the phase that it began with.
+
+One multiplier is +1 all along: that of the shift in time. Bifurcations of cycles are singular points of the same
+equations with the conditions of `curves.kinds.singular` besides (`CycleWith`), limit points extrema of p along them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from suboctave.bifurcation.bifurcation import Bifurcation
+from suboctave.continuation.linear import length
+from suboctave.curves.augmentation import Augmentation, Equations
+from suboctave.curves.kinds.singular import SingularEquations, SingularOperator
+from suboctave.errors import InputError
+from suboctave.harmonic.basis import Array, HarmonicBasis
+from suboctave.harmonic.evaluation import BalanceState
+from suboctave.lazy import lazy
+
+#: cosine of a motion with the reference below which that is replaced
+_RESEMBLES = 0.5
+
+
+@dataclass(frozen=True)
+class LimitCycle(Augmentation):
+    """Y is `reference`, coefficients (2 H + 1, size) in `basis`."""
+
+    reference: Array
+    basis: HarmonicBasis
+    name = "limit_cycle"
+    free_phase = True
+
+    @classmethod
+    def of(cls, state: BalanceState) -> LimitCycle:
+        """With the phase of a motion."""
+        if state.load[1:].any():
+            raise InputError("a load drives this motion: only motions that no load keeps going choose their frequency")
+        return cls(state.x, state.basis)
+
+    @classmethod
+    def through(cls, item: Bifurcation, state: BalanceState, names: tuple[str, ...]) -> tuple[LimitCycle, Array]:
+        """See `Augmentation.through`."""
+        return cls.of(state), np.zeros(0)
+
+    def multiplier(self, rate: float, extra: Array) -> complex:
+        return 1.0 + 0.0j
+
+    def at(self, state: BalanceState, extra: Array, names: tuple[str, ...]) -> CycleEquations:
+        return CycleEquations(self, state, names)
+
+    def resized(self, basis: HarmonicBasis, size: int) -> LimitCycle:
+        return replace(self, reference=self.basis.resized(self.reference, basis), basis=basis)
+
+
+def oscillating(state: BalanceState) -> Array:
+    """The coefficients of a motion but its mean, weighted by the square roots of the masses."""
+    x: Array = state.x * state.balance.scales()[0]
+    x[0] = 0.0
+    return x
+
+
+class CycleEquations(Equations):
+    """The phase condition, relative to both motions."""
+
+    def __init__(self, of: LimitCycle, state: BalanceState, names: tuple[str, ...]) -> None:
+        self.of, self.state, self.names = of, state, names
+        self.weights = state.balance.scales()[0]
+        reference = of.reference * self.weights
+        k = np.arange(1, state.basis.harmonics + 1)[:, None]
+        #: D Y
+        self.turning = np.zeros_like(reference)
+        self.turning[1::2], self.turning[2::2] = k * reference[2::2], -k * reference[1::2]
+        reference[0] = 0.0
+        self.reference = reference
+        self.unit = (length(self.turning) or 1.0) * (length(oscillating(state)) or 1.0)
+
+    @property
+    def values(self) -> Array:
+        return np.array([float(np.vdot(self.turning, self.state.x * self.weights)) / self.unit])
+
+    @lazy
+    def rows(self) -> Array:
+        along = (self.turning * self.weights).ravel() / self.unit
+        return np.append(along, np.zeros(len(self.names)))[None]
+
+    def renewed(self) -> LimitCycle:
+        x, y = oscillating(self.state), self.reference
+        alike = float(np.vdot(x, y)) > _RESEMBLES * length(x) * length(y)
+        return self.of if alike else LimitCycle.of(self.state)
+
+
+@dataclass(frozen=True)
+class CycleWith(SingularOperator):
+    """Limit cycles at a period doubling or a Neimark-Sacker point: the phase condition of `cycle` besides."""
+
+    cycle: LimitCycle
+    free_phase = True
+
+    @classmethod
+    def through(cls, item: Bifurcation, state: BalanceState, names: tuple[str, ...]) -> tuple[CycleWith, Array]:
+        """See `Augmentation.through`."""
+        own, extra = SingularOperator.through(item, state, names)
+        return cls(own.kind, own.borders, own.unit, LimitCycle.of(state)), extra
+
+    def at(self, state: BalanceState, extra: Array, names: tuple[str, ...]) -> CycleWithEquations:
+        return CycleWithEquations(self, state, extra, names)
+
+    def resized(self, basis: HarmonicBasis, size: int) -> CycleWith:
+        return replace(
+            self, borders=self.borders.resized(basis, size, self.kind), cycle=self.cycle.resized(basis, size)
+        )
+
+
+class CycleWithEquations(SingularEquations):
+    """The phase condition and those of the bifurcation."""
+
+    of: CycleWith
+
+    def __init__(self, of: CycleWith, state: BalanceState, extra: Array, names: tuple[str, ...]) -> None:
+        super().__init__(of, state, float(extra[0]) if of.extras else 0.0, names)
+        self.cycle = of.cycle.at(state, extra, names)
+
+    @lazy
+    def values(self) -> Array:
+        return np.concatenate((self.cycle.values, super().values))
+
+    @property
+    def rows(self) -> Array:
+        phase = np.insert(self.cycle.rows, [self.state.balance.dimension] * self.of.extras, 0.0, axis=1)
+        return np.concatenate((phase, super().rows))
+
+    def renewed(self) -> CycleWith:
+        own = super().renewed()
+        return CycleWith(own.kind, own.borders, own.unit, self.cycle.renewed())
