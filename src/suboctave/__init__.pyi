@@ -16,6 +16,8 @@ from .analysis.subharmonics import (
     periodic_orbit as periodic_orbit,
 )
 from .analysis.track import track as track
+from .analysis.limit_cycles import limit_cycles as limit_cycles
+from .analysis.equilibria import equilibria as equilibria
 from .analysis.track_peak import track_peak as track_peak
 from .bifurcation.bifurcation import Bifurcation as Bifurcation
 from .continuation import Event as Event, NewtonOptions as NewtonOptions, SteppingOptions as SteppingOptions

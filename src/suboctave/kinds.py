@@ -78,7 +78,9 @@ KINDS: dict[str, Kind] = {
         "limit cycle", (5, 1, 180), "#56B4E9", multiplier=1.0, critical=1, equations="limit_cycle:LimitCycle",
         choices={}, line="#0072B2",
     ),
-    "Hopf": Kind("Hopf point", (5, 0, 180), "#009E73", 0.92),
+    "Hopf": Kind(
+        "Hopf point", (5, 0, 180), "#009E73", 0.92, critical=2, equations="singular:SingularOperator", line="#009E73"
+    ),
     "extremum": Kind("extremum of a parameter along a curve of bifurcations", "d", _WHITE, 0.9, "extremum"),
     "CP": Kind("cusp", "P", "#0072B2", 1.1),
     "GPD": Kind("generalised period doubling", "h", "#E69F00", 1.12),

@@ -101,7 +101,7 @@ def frequency_response(
             trace = subharmonic_start(curve, run)
         else:
             given = _written(harmonics, options, subharmonic=subharmonic, linear=linear)
-            trace = _from_end(curve, start, run, f"so.frequency_response(system, ({last!r}, {first!r}){given})")
+            trace = from_end(curve, start, run, f"so.frequency_response(system, ({last!r}, {first!r}){given})")
     return run.branch(trace)
 
 
@@ -187,7 +187,7 @@ def _from_system(
     curve = run.scaled(run.curve(float(omega), 1, None))
     given = f", ({last!r}, {first!r}), omega={float(omega)!r}{_written(wanted, options)}"
     with run.reporting(options.get("progress"), f"along {parameter}") as run:
-        trace = _from_end(curve, None, run, f"so.continue_branch(system, {parameter!r}{given})")
+        trace = from_end(curve, None, run, f"so.continue_branch(system, {parameter!r}{given})")
     return run.branch(trace)
 
 
@@ -207,7 +207,7 @@ def _written(harmonics: Harmonics, options: CurveOptions, **more: Any) -> str:
     return "".join(words)
 
 
-def _from_end(curve: MotionProblem, start: Any, run: CurveRun, call: str) -> Trace:
+def from_end(curve: MotionProblem, start: Any, run: CurveRun, call: str) -> Trace:
     """The branch from the first value on, with a warning where it leaves its range there: the motions at the other end
     lie on another one, which `call` follows.
     """

@@ -223,7 +223,10 @@ def _free(item: Bifurcation, parameter: Any, bounds: Any, omega: Any) -> tuple[t
             f"track follows {', '.join(TRACKED_KINDS)} and extrema along their curves, and other curves from "
             f"{', '.join(CURVES_THROUGH)}; this is a {item.kind}"
         )
-    system = item.orbit.system
+    system, known = item.orbit.system, Inherited(item)
+    if isinstance(parameter, str) and "still" in known.known:
+        # an equilibrium has no omega
+        parameter, bounds = (item.parameter_name, parameter), (known.bounds(item.parameter_name), bounds)
     if isinstance(parameter, str):
         names: tuple[str, ...] = ("omega", parameter)
         if parameter == "omega":

@@ -80,7 +80,7 @@ class Bifurcation:
     null_vectors
         Right and left null vectors of the singular operator (weighted by masses), None for user events.
     kappa
-        Frequency of the perturbation at an NS, rad per unit time; else 0.
+        Frequency of the perturbation at an NS or a Hopf point, rad per unit time; else 0.
     uncertainty
         Half-width in the free parameter of what is not resolved: of the bracket if the point could only be bracketed;
         behind a grazing that of the neglected harmonics, estimated with half as many more; else 0.
@@ -178,8 +178,8 @@ class Bifurcation:
 
     @property
     def omega(self) -> float:
-        """Circular frequency of the load."""
-        return self.orbit.omega
+        """Circular frequency of the load; at a Hopf point that of the oscillation which begins."""
+        return self.kappa if self.kind == "Hopf" else self.orbit.omega
 
     @property
     def parameters(self) -> Mapping[str, float]:

@@ -324,6 +324,7 @@ FORMS: dict[str, tuple[Kind, Callable[[BalanceState, NullVectors, str, float], T
     "PD": (Kind.HALF, period_doubling),
     "BP": (Kind.INTEGER, branch_point),
     "NS": (Kind.FREE, torus),
+    "Hopf": (Kind.FREE, torus),
 }
 
 
@@ -334,7 +335,7 @@ def normal_form(kind: str, state: BalanceState, vectors: NullVectors, name: str,
     frequency of the perturbation at an NS, rad per time.
     """
     if kind not in FORMS:
-        raise InputError(f"a {kind!r} has no normal form; it is for LP, BP, PD and NS")
+        raise InputError(f"a {kind!r} has no normal form; it is for LP, BP, PD, NS and Hopf points")
     known = ["omega", *state.values]
     if name not in known:
         raise InputError(f"unknown parameter {name!r}{suggest(name, known)}")

@@ -22,7 +22,7 @@ from suboctave.harmonic.perturbation import Kind, rate_by_kappa
 from suboctave.lazy import lazy
 
 _NAMES = {Kind.INTEGER: "LP", Kind.HALF: "PD", Kind.FREE: "NS"}
-OPERATORS = {name: kind for kind, name in _NAMES.items()}
+OPERATORS = {name: kind for kind, name in _NAMES.items()} | {"Hopf": Kind.FREE}
 
 
 @dataclass(frozen=True)

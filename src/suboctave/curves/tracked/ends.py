@@ -23,10 +23,13 @@ from functools import partial
 
 import numpy as np
 
+from suboctave.bifurcation.bifurcation import TrackedEvent
 from suboctave.continuation import CurvePoint, NewtonOptions
+from suboctave.continuation.linear import length
 from suboctave.continuation.point import point_ahead
 from suboctave.continuation.problem import Array
 from suboctave.curves.augmentation import Augmentation
+from suboctave.curves.hopf import hopf_beside
 from suboctave.curves.junction import NOTHING_LEFT, doubled_size, subharmonic_share
 from suboctave.curves.kinds.branch_point import BranchPointUnfolded
 from suboctave.curves.kinds.limit_cycle import oscillating
@@ -76,10 +79,13 @@ class End:
     reason: str
     event: LocatedEvent | None = None
     last: bool = False
+    #: the Hopf point in which limit cycles end, and how far behind the last point
+    hopf: TrackedEvent | None = None
+    behind: float = 0.0
 
     def way(self, a: Sample) -> float:
         """Distance in the plane of the parameters from a point to the event, in scaled arclength."""
-        return 0.0 if self.event is None else _apart(self.event.sample.point, a.point)
+        return self.behind if self.event is None else _apart(self.event.sample.point, a.point)
 
 
 def end_between(a: Sample, b: Sample, newton: NewtonOptions, lopsided: bool = True) -> End | None:
@@ -142,7 +148,14 @@ def _own_part(sample: Sample) -> Array:
 def _in_its_parent(a: Sample, b: Sample) -> End:
     if b.state.basis.nu % 2 == 0:
         return End(f"the doubled part of the motions vanishes between {a.where} and {b.where}: in a period doubling")
-    return End(f"the oscillation vanishes between {a.where} and {b.where}: in a Hopf point")
+    try:
+        hopf = hopf_beside(a, b)
+        one, other = (length(oscillating(sample.state)) for sample in (a, b))
+        share = one / (one + other)
+    except ConvergenceError as failure:
+        return End(f"the oscillation vanishes between {a.where} and {b.where} ({failure})")
+    where = f"omega = {hopf.omega:.6g}, {hopf.parameter_name} = {hopf.parameter(hopf.parameter_name):.6g}"
+    return End(f"the oscillation vanishes in a Hopf point at {where}", hopf=hopf, behind=share * (b.place - a.place))
 
 
 def resonant_between(a: Sample, b: Sample) -> float | None:

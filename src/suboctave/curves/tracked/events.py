@@ -200,7 +200,7 @@ def located(test: CurveTest, low: Sample, high: Sample, newton: NewtonOptions) -
     if not apart and abs(bracket.values[share]) > little:
         share = bracket.zero(_RESOLVED)
         if abs(bracket.values[share]) > little:
-            # it changes sign without vanishing, as c3 does in a corner
+            own.jumps()
             return None
     sample, value = Sample(bracket.points[share]), bracket.values[share]
     if not own.genuine(sample):

@@ -36,6 +36,8 @@ from suboctave.errors import ConvergenceError
 
 #: steps longer than this, in scaled arclength, must not change the curve's orientation
 _JUMP = 2e-6
+#: growth of motions from that at the start after which they may grow for ever
+_GROWN = 1e4
 #: steps that need not come closer to the end of an NS curve
 _NEAR_END = 1e-3
 #: corners after which no further one is passed
@@ -183,11 +185,22 @@ class _Tracker(Driver):
         self._add(new)
         self.previous = new
         self._report(point)
+        if self._grows(new):
+            detail = f"the motions grow without bound at {new.where}, where the parameters stand still: any size solves"
+            return Ending(EndReason.NO_MEANING, new.where, detail)
         ahead = None if self.march.ending.reason is not EndReason.NOT_STARTED else end_ahead(a, new, settings.newton)
         if ahead is None:
             return None
         self._take_end(new, ahead)
         return Ending(EndReason.MOTIONS_END, detail=ahead.reason)
+
+    def _grows(self, sample: Sample) -> bool:
+        """Whether motions without a load have grown by orders of magnitude where the parameters stand still."""
+        assert self.home is not None
+        curve, first = sample.curve, self.home
+        if not curve.augmentation.free_phase or curve.size(sample.point.u) < _GROWN * first.curve.size(first.u):
+            return False
+        return all(test.stands(sample) for test in self.tests if isinstance(test, Extremum))
 
     def _take(self, events: list[LocatedEvent]) -> None:
         settings, warnings = self.settings, self.trace.warnings
@@ -227,6 +240,9 @@ class _Tracker(Driver):
             self._add(b)
             a = b
         arclength = a.point.arclength + end.way(a)
+        if end.hopf is not None:
+            size = end.hopf.orbit.amplitude(settings.observe)
+            self.trace.bifurcations.append(replace(end.hopf, amplitude=size, arclength=arclength))
         if end.event is not None:
             event = refined(end.event, settings.newton, self.trace.warnings)
             item = as_event(event, settings.stability, settings.observe)

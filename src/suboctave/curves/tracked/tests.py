@@ -51,8 +51,6 @@ _CORRECTIONS, _KNOWN = 6, 1e-11
 #: distance of that kappa from the one of the multipliers, in the same units, at which it belongs to another pair, and
 #: of that pair's growth from that of the multipliers, as a share
 _STRAYED, _AGREES = 0.1, 0.25
-#: least singular value of a crossing matrix above which no curves cross
-_CROSSED = 1e-5
 #: logarithm of a pair's modulus up to which it may be on the unit circle
 _ON_IT = 0.03
 
@@ -87,6 +85,11 @@ class CurveTest(ABC):
         """Whether what was located is an event."""
         return True
 
+    def jumps(self) -> None:  # noqa: B027 - harmless as a rule
+        """It changes sign without vanishing, as c3 does in a corner; raises ConvergenceError where that is no accident
+        of the test alone.
+        """
+
     def extreme(self, before: float, at: Sample) -> str:
         """Whether a parameter that turns has a maximum or a minimum, empty for other events; before: the sign before
         it.
@@ -119,14 +122,14 @@ class Extremum(CurveTest):
         return "maximum" if rising > 0.0 else "minimum"
 
     def changed(self, a: Sample, b: Sample) -> bool:
-        return not (self._level(a) and self._level(b)) and super().changed(a, b)
+        return not (self.stands(a) and self.stands(b)) and super().changed(a, b)
 
     def smooth(self, sample: Sample) -> tuple[float, float]:
         # at a cusp it vanishes as well; the same all along a parameter that stays as it is
         slope = sample.slopes[self.name]
-        return (1.0, _logarithm(_LEVEL)) if self._level(sample) else (math.copysign(1.0, slope), _logarithm(slope))
+        return (1.0, _logarithm(_LEVEL)) if self.stands(sample) else (math.copysign(1.0, slope), _logarithm(slope))
 
-    def _level(self, sample: Sample) -> bool:
+    def stands(self, sample: Sample) -> bool:
         """Whether the parameter stays as it is but for rounding."""
         weight = float(sample.point.weights[sample.curve.index(self.name)])
         return abs(sample.slopes[self.name] * weight) < _LEVEL
@@ -163,12 +166,8 @@ class CurvesCross(CurveTest):
         sign, size = np.linalg.slogdet(crossing_matrix(sample.point))
         return float(sign), float(size)
 
-    def genuine(self, sample: Sample) -> bool:
-        """See `CurveTest.genuine`; raises ConvergenceError where no curves cross."""
-        least = float(np.linalg.svd(crossing_matrix(sample.point), compute_uv=False)[-1])
-        if least > _CROSSED:
-            raise ConvergenceError("the orientation changes, and no curves cross: the curve may have jumped to another")
-        return True
+    def jumps(self) -> None:
+        raise ConvergenceError("the orientation changes, and no curves cross: the curve may have jumped to another")
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,172 @@
+"""Limit cycles: oscillations that a system keeps going by itself, from a Hopf point or from any of them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, Unpack
+
+import numpy as np
+
+from suboctave.analysis.equilibria import check_undriven
+from suboctave.analysis.options import Inherited, TrackOptions
+from suboctave.analysis.track import track
+from suboctave.bifurcation.bifurcation import Bifurcation
+from suboctave.continuation.linear import length
+from suboctave.continuation.newton import NewtonOptions, correct
+from suboctave.curves.hopf import shape_of
+from suboctave.curves.motion import MotionEvaluation
+from suboctave.curves.starts import rule_of
+from suboctave.curves.trace import BranchPoint
+from suboctave.curves.tracked.start import curve_through
+from suboctave.errors import ConvergenceError, InputError
+from suboctave.floquet.methods import Monodromy
+from suboctave.harmonic.basis import Array, HarmonicBasis
+from suboctave.harmonic.evaluation import BalanceState
+from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.harmonic.truncation import AdaptiveHarmonics
+from suboctave.model.inputs import check_bounds, check_parameter, timed
+from suboctave.options import with_options
+from suboctave.results.branch import TrackedBranch
+
+#: share by which forces must deviate from linear ones for an oscillation to count as nonlinear, and of the parameter's
+#: range by which that is moved besides: its forces alone may be nonlinear
+_NOTICED, _ASIDE = 0.01, 0.01
+#: shares of that size at which the first cycle is looked for
+_SIZES = (1.0, 0.3, 0.1, 0.03)
+#: change of the frequency, as a share, up to which it is the oscillation that begins there
+_SAME = 0.3
+
+
+@with_options(TrackOptions)
+@timed
+def limit_cycles(
+    start: Bifurcation | BranchPoint | PeriodicOrbit,
+    bounds: tuple[float, float] | None = None,
+    parameter: str | None = None,
+    *,
+    omega: tuple[float, float] | None = None,
+    harmonics: int | str | AdaptiveHarmonics = "adaptive",
+    **options: Unpack[TrackOptions],
+) -> TrackedBranch:
+    """Oscillations that nothing drives, over a parameter: frequency, stability, and their bifurcations.
+
+    Their frequency is unknown and their phase free (`suboctave.curves.kinds.limit_cycle`); one multiplier is +1. They
+    end where they shrink to an equilibrium, in a Hopf point, or meet those of half the period.
+
+    Parameters
+    ----------
+    start
+        A "Hopf" of `equilibria`; or a motion that no load drives, or nearly one: of a branch along the load at its
+        value zero, for example.
+    bounds
+        Range of the parameter (from, to); from a Hopf point default that of its equilibria.
+    parameter
+        Its name; from a Hopf point default that along which it was found.
+    omega
+        Range of their frequency, rad per unit time; default: not bounded.
+    harmonics
+        As in `frequency_response`, of the cycle's own frequency.
+
+    Returns
+    -------
+    TrackedBranch
+        Of kind "limit_cycle" over (omega, parameter). Among its `bifurcations` are LP, where the parameter turns, BP,
+        PD, NS, "Hopf" where it ends in one, and the extrema of omega. `track` follows LP, PD and NS in another
+        parameter, `switch_branch` what leaves a PD or BP.
+
+    Raises
+    ------
+    InputError
+        Wrong input, before any work: also a start from an equilibrium that is no Hopf point.
+    ConvergenceError
+        If no cycle is found beside the start.
+    """
+    if isinstance(start, PeriodicOrbit):
+        motion: Any = BranchPoint(start, None, 0.0, 0, Monodromy())
+        orbit = start
+    elif isinstance(start, Bifurcation | BranchPoint):
+        motion, orbit = start, start.orbit
+    else:
+        raise InputError(
+            f"limit cycles begin at a Hopf point (equilibria(...).bifurcations) or at a motion, not at "
+            f"{type(start).__name__}"
+        )
+    check_undriven(orbit.system)
+    known = Inherited(start) if isinstance(start, Bifurcation) else None
+    if parameter is None:
+        if not isinstance(start, Bifurcation) or start.parameter_name == "omega":
+            raise InputError("name the parameter= over which the cycles are followed")
+        parameter = start.parameter_name
+    check_parameter(orbit.system, parameter)
+    if bounds is None:
+        if known is None:
+            raise InputError(f"give bounds=(from, to) of {parameter}")
+        bounds = known.bounds(parameter)
+    ends = check_bounds(orbit.system, parameter, bounds)
+    if not orbit.x[1:].any():
+        if not isinstance(start, Bifurcation) or start.kind != "Hopf":
+            kind = getattr(start, "kind", "equilibrium")
+            raise InputError(f"an oscillation begins at Hopf points only, this {kind} is none: nothing moves there")
+        motion = BranchPoint(_first_cycle(start, parameter, ends, harmonics), None, 0.0, 0, Monodromy())
+    return track(motion, parameter, ends, omega=omega, onto="limit_cycle", harmonics=harmonics, **options)
+
+
+def _first_cycle(hopf: Bifurcation, name: str, ends: tuple[float, float], harmonics: Any) -> PeriodicOrbit:
+    """A small cycle beside a Hopf point, as large as its forces begin to be nonlinear; ConvergenceError if none is
+    found.
+    """
+    rule = rule_of(harmonics)
+    basis = HarmonicBasis(rule if isinstance(rule, int) else rule.minimum)
+    low, high = min(ends), max(ends)
+    state = hopf.orbit.state()
+    if hopf.null_vectors is None:
+        raise ConvergenceError("this Hopf point could only be bracketed: what begins there is not known")
+    vector = hopf.null_vectors.right
+    shape = shape_of(vector, state.balance.size, state.balance.row_weights(len(vector)))
+    unit = _noticed(state, shape, name, _ASIDE * (high - low))
+    rest = replace(hopf.orbit, omega=hopf.kappa)
+    reason = "they lie elsewhere"
+    for share in _SIZES:
+        x = hopf.orbit.x + share * unit * shape
+        guess = Bifurcation(
+            "limit_cycle", replace(rest, x=x), hopf.floquet, 0.0, 0.0, name, context={"observe": 0, "onto": {}}
+        )
+        curve, u = curve_through(guess, basis, ("omega", name), {name: (low, high)})
+        weights = curve.weights(u, 0.0)
+        along = curve.join(hopf.orbit.basis.resized(shape, basis), 0.0)
+        row = weights * along
+        try:
+            solved = correct(curve, u, row / length(row), weights, NewtonOptions())
+        except ConvergenceError as failure:
+            reason = str(failure)
+            continue
+        evaluation = solved.evaluation
+        assert isinstance(evaluation, MotionEvaluation)
+        found = evaluation.state
+        value = found.values[name]
+        if abs(found.omega / hopf.kappa - 1.0) <= _SAME and low <= value <= high:
+            return replace(
+                rest, balance=found.balance, x=found.x.copy(), omega=found.omega, values=dict(found.values)
+            )
+        reason = f"what was found lies at {curve.where(solved.u)}"
+    raise ConvergenceError(
+        f"no limit cycle was found beside the Hopf point at {name} = {hopf.parameter(name):.6g}: {reason}"
+    )
+
+
+def _noticed(state: BalanceState, shape: Array, name: str, aside: float) -> float:
+    """The size from which on an oscillation about an equilibrium is nonlinear, at a parameter or a little beside."""
+    sizes = []
+    for value in (state.values[name], state.values[name] + aside, state.values[name] - aside):
+        at = {**state.values, name: value}
+        rest = state.balance.at(state.x, state.omega, at)
+        slope = rest.force_jacobian @ shape.ravel()
+        linear = length(rest.linear_jacobian @ shape.ravel()) + length(slope)
+        for size in np.geomspace(1e-12, 1e12, 145):
+            bent = state.balance.at(state.x + size * shape, state.omega, at).force - rest.force
+            if not np.isfinite(bent).all() or length(bent.ravel() / size - slope) > _NOTICED * linear:
+                sizes.append(float(size))
+                break
+    if not sizes:
+        raise ConvergenceError("the system is linear: oscillations of any size begin at this Hopf point")
+    return min(sizes)

@@ -1,0 +1,76 @@
+"""Equilibria along a parameter: motions that do not move, with eigenvalues in the place of multipliers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from suboctave.harmonic.basis import Array, ComplexArray
+from suboctave.results.branch import Branch
+
+if TYPE_CHECKING:
+    import pandas
+
+
+class Equilibria(Branch):
+    """A curve of equilibria along one parameter, in order; read like a `Branch`.
+
+    Attributes
+    ----------
+    bifurcations
+        LP (two equilibria meet and vanish), BP (branches cross), "Hopf" (an oscillation begins; `omega` is its circular
+        frequency), in the order met.
+    omega
+        The frequency that they are written with, beyond all at which they may oscillate: a matter of the method.
+    """
+
+    @cached_property
+    def positions(self) -> Array:
+        """Displacements of all degrees of freedom, shape (len, n)."""
+        return np.array([orbit.displacement(0.0) for orbit in self.orbits])
+
+    @cached_property
+    def eigenvalues(self) -> ComplexArray:
+        """Eigenvalues of the linearised equation of motion, by descending real part, shape (len, 2 N): `exp(lambda t)`,
+        from the multipliers over the period of `omega`; -inf where the motion is gone within it.
+        """
+        with np.errstate(divide="ignore"):
+            values = np.log(self.multipliers) * (self.omega / (2.0 * np.pi))[:, None]
+        order = np.argsort(-values.real, axis=1, kind="stable")
+        result: ComplexArray = np.take_along_axis(values, order, axis=1)
+        return result
+
+    def to_dataframe(self, readings: Iterable[str] | bool = False) -> pandas.DataFrame:
+        """One row per point: the parameter, |x| of the observed DOF, stability, the leading eigenvalue, errors."""
+        import pandas as pd
+
+        table = super().to_dataframe(readings)
+        leading = self.eigenvalues[:, 0]
+        first = {self.name: table[self.name], "amplitude": table["amplitude"], "stable": table["stable"]}
+        first |= {"eigenvalue_real": leading.real, "eigenvalue_imag": leading.imag}
+        left_out = ("omega", "multiplier_real", "multiplier_imag", "harmonics", "truncation", *first)
+        return pd.DataFrame(first | {name: table[name] for name in table if name not in left_out})
+
+    @property
+    def _head(self) -> str:
+        values = self.parameter(self.name)
+        return (
+            f"Equilibria: {len(self)} points ({self.verdicts}), {self.name} from {values[0]:.6g} to {values[-1]:.6g}; "
+            f"{self.ended}."
+        )
+
+    def __repr__(self) -> str:
+        notes = [f"  note: {warning}" for warning in self.warnings]
+        rows = [f"{'kind':<6}{self.name:>14}{'omega':>13}{'position':>14}{'criticality':>15}{'residual':>11}"]
+        for b in self.bifurcations:
+            frequency = f"{b.omega:.9g}" if b.kind == "Hopf" else ""
+            label, remark = b.criticality or "", b.remark()
+            rows.append(
+                f"{b.kind:<6}{b.parameter(self.name):>14.8g}{frequency:>13}{b.amplitude:>14.7g}{label:>15}"
+                f"{b.residual:>11.1e}" + (f"  {remark}" if remark else "")
+            )
+        table = rows if len(rows) > 1 else ["no bifurcations"]
+        return "\n".join([self._head, *(f"  {words}" for words in self.basis), *notes, *table])
