@@ -15,14 +15,12 @@ from suboctave.curves.hopf import BEYOND, STILL
 from suboctave.errors import ConvergenceError, InputError, is_number, shortened
 from suboctave.harmonic.basis import Array
 from suboctave.model.inputs import check_bounds, check_is_system, check_parameter, numbers_of, timed
-from suboctave.model.linearised import eigenvalues
+from suboctave.model.linearised import ALL_EIGENVALUES, eigenvalues
 from suboctave.model.system import System
 from suboctave.options import with_options
 from suboctave.results.branch import Branch
 from suboctave.results.equilibria import Equilibria
 
-#: degrees of freedom up to which all eigenvalues are asked for
-_MOST = 400
 #: share of half the frequency that equilibria are written with which theirs may reach; tries to find one high enough
 _BELOW, _TRIES = 0.9, 4
 
@@ -73,7 +71,7 @@ def equilibria(
     ends = check_bounds(system, parameter, bounds)
     if highest is not None and not (is_number(highest) and highest > 0.0):
         raise InputError(f"highest must be a positive frequency, not {shortened(highest)}")
-    if highest is None and system.n > _MOST:
+    if highest is None and system.n > ALL_EIGENVALUES:
         raise InputError(f"of {system.n} degrees of freedom say the highest= frequency, rad per unit time, that matters")
     x = np.zeros(system.n) if start is None else numbers_of(start)
     if x.shape != (system.n,):

@@ -31,6 +31,8 @@ from suboctave.results.branch import TrackedBranch
 #: share by which forces must deviate from linear ones for an oscillation to count as nonlinear, and of the parameter's
 #: range by which that is moved besides: its forces alone may be nonlinear
 _NOTICED, _ASIDE = 0.01, 0.01
+#: share of a motion that oscillates below which it stands still
+_STILL = 1e-8
 #: shares of that size at which the first cycle is looked for
 _SIZES = (1.0, 0.3, 0.1, 0.03)
 #: change of the frequency, as a share, up to which it is the oscillation that begins there
@@ -93,6 +95,8 @@ def limit_cycles(
         )
     check_undriven(orbit.system)
     known = Inherited(start) if isinstance(start, Bifurcation) else None
+    if length(orbit.x[1:].ravel()) <= _STILL * length(orbit.x.ravel()) and getattr(start, "kind", "") != "Hopf":
+        raise InputError("nothing moves there: limit cycles begin at Hopf points, or at a motion")
     if parameter is None:
         if not isinstance(start, Bifurcation) or start.parameter_name == "omega":
             raise InputError("name the parameter= over which the cycles are followed")
@@ -103,10 +107,9 @@ def limit_cycles(
             raise InputError(f"give bounds=(from, to) of {parameter}")
         bounds = known.bounds(parameter)
     ends = check_bounds(orbit.system, parameter, bounds)
-    if not orbit.x[1:].any():
-        if not isinstance(start, Bifurcation) or start.kind != "Hopf":
-            kind = getattr(start, "kind", "equilibrium")
-            raise InputError(f"an oscillation begins at Hopf points only, this {kind} is none: nothing moves there")
+    if known is not None and "still" in known.known:
+        if start.kind != "Hopf":
+            raise InputError(f"an oscillation begins at Hopf points only: this is a {start.kind} of equilibria")
         motion = BranchPoint(_first_cycle(start, parameter, ends, harmonics), None, 0.0, 0, Monodromy())
     return track(motion, parameter, ends, omega=omega, onto="limit_cycle", harmonics=harmonics, **options)
 

@@ -11,6 +11,10 @@ from suboctave.model.elements.coupled import as_coupled
 from suboctave.model.system import System
 
 
+#: degrees of freedom up to which all eigenvalues are asked for
+ALL_EIGENVALUES = 400
+
+
 def tangent_matrices(system: System, x: Array, values: Mapping[str, float]) -> tuple[Array, Array, Array]:
     """Mass, damping and stiffness of small motions about displacements x (n,), which stand still; each (n, n)."""
     n = system.n

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from suboctave.harmonic.basis import Array, ComplexArray
+from suboctave.model.linearised import ALL_EIGENVALUES, eigenvalues
 from suboctave.results.branch import Branch
 
 if TYPE_CHECKING:
@@ -34,11 +35,17 @@ class Equilibria(Branch):
 
     @cached_property
     def eigenvalues(self) -> ComplexArray:
-        """Eigenvalues of the linearised equation of motion, by descending real part, shape (len, 2 N): `exp(lambda t)`,
-        from the multipliers over the period of `omega`; -inf where the motion is gone within it.
+        """Eigenvalues of the linearised equation of motion, `exp(lambda t)`, by descending real part, shape (len, 2 N).
+
+        Of systems with more than 400 degrees of freedom from the multipliers over the period of `omega`, nan where a
+        motion is gone within it.
         """
-        with np.errstate(divide="ignore"):
-            values = np.log(self.multipliers) * (self.omega / (2.0 * np.pi))[:, None]
+        if self.system.n <= ALL_EIGENVALUES:
+            places = zip(self.positions, self.orbits, strict=True)
+            values = np.array([eigenvalues(self.system, x, orbit.values) for x, orbit in places])
+        else:
+            told = np.where(np.abs(self.multipliers) > self.multiplier_errors, self.multipliers, np.nan)
+            values = np.log(told) * (self.omega / (2.0 * np.pi))[:, None]
         order = np.argsort(-values.real, axis=1, kind="stable")
         result: ComplexArray = np.take_along_axis(values, order, axis=1)
         return result

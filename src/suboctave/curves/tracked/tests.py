@@ -28,6 +28,7 @@ from itertools import product
 import numpy as np
 
 from suboctave.bifurcation.bordered import NullVectors, bordered, null_vectors, transversality
+from suboctave.continuation.linear import Factor
 from suboctave.continuation.point import crossing_matrix
 from suboctave.curves.kinds.singular import SingularOperator
 from suboctave.curves.motion import MotionProblem
@@ -155,16 +156,17 @@ class CurvesCross(CurveTest):
         if self.borders is None:
             return sample.point.orientation
         matrix, (left, right) = crossing_matrix(sample.point), self.borders
-        whole = np.block([[matrix, left[:, None]], [right[None], np.zeros((1, 1))]])
-        return float(np.linalg.solve(whole, np.eye(1, len(whole), len(matrix))[0])[-1])
+        whole = Factor.of(np.block([[matrix, left[:, None]], [right[None], np.zeros((1, 1))]]))
+        return float(whole.solve(np.eye(1, len(matrix) + 1, len(matrix))[0])[-1]) * whole.sign
 
     def within(self, a: Sample, b: Sample) -> CurveTest:
         u, _, vt = np.linalg.svd(crossing_matrix(b.point))
         return replace(self, borders=(u[:, -1], vt[-1]))
 
     def smooth(self, sample: Sample) -> tuple[float, float]:
-        sign, size = np.linalg.slogdet(crossing_matrix(sample.point))
-        return float(sign), float(size)
+        # what more harmonics do to a determinant is no matter of the motion; the parameter turns where it vanishes, too
+        _, size = symmetric_functions(sample.others)[:, 0].tolist()
+        return sample.point.orientation, size - _logarithm(sample.slopes[sample.curve.name])
 
     def jumps(self) -> None:
         raise ConvergenceError("the orientation changes, and no curves cross: the curve may have jumped to another")
@@ -242,7 +244,9 @@ class RealCrossing(CurveTest):
     def value(self, sample: Sample) -> float:
         if self.borders is None:
             return sample.sign(self.operator)
-        return float(bordered(sample.state, self.operator, self.borders).g.real)
+        border = bordered(sample.state, self.operator, self.borders)
+        # of the sign of the determinant, whichever way the null vectors point: more harmonics may turn them
+        return float(border.g.real) * border.factor.sign
 
     def within(self, a: Sample, b: Sample) -> CurveTest:
         return replace(self, borders=null_vectors(b.state, self.operator))
@@ -370,8 +374,21 @@ def _census(mu: ComplexArray) -> tuple[int, int, int]:
     return int((np.abs(mu) > 1.0).sum()), int((real > 1.0).sum()) % 2, int((real < -1.0).sum()) % 2
 
 
+@dataclass(frozen=True)
+class Doubling(RealCrossing):
+    """PD of the motions that a curve consists of."""
+
+    kind: str = "PD"
+    operator: Kind = Kind.HALF
+
+    def smooth(self, sample: Sample) -> tuple[float, float]:
+        # what more harmonics do to a determinant is no matter of the motion
+        sign, size = symmetric_functions(sample.others)[:, 1].tolist()
+        return sign, size
+
+
 #: on curves of motions that need no critical multiplier; of a free phase
-_CROSSINGS = (RealCrossing("PD", Kind.HALF), PairCrossing("NS"))
+_CROSSINGS = (Doubling(), PairCrossing("NS"))
 _OF_MOTIONS = (
     LimitOrBranchPoint("LP", Kind.INTEGER),
     LimitOrBranchPoint("BP", Kind.INTEGER),
