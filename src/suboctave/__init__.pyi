@@ -7,6 +7,8 @@ from .analysis.branches import (
     switch_branch as switch_branch,
 )
 from .analysis.diagram import bifurcation_diagram as bifurcation_diagram
+from .analysis.equilibria import equilibria as equilibria
+from .analysis.limit_cycles import limit_cycles as limit_cycles
 from .analysis.locate_extremum import locate_extremum as locate_extremum
 from .analysis.phase_resonance import phase_resonance as phase_resonance
 from .analysis.sensitivity import Sensitivity as Sensitivity, sensitivity as sensitivity
@@ -16,8 +18,6 @@ from .analysis.subharmonics import (
     periodic_orbit as periodic_orbit,
 )
 from .analysis.track import track as track
-from .analysis.limit_cycles import limit_cycles as limit_cycles
-from .analysis.equilibria import equilibria as equilibria
 from .analysis.track_peak import track_peak as track_peak
 from .bifurcation.bifurcation import Bifurcation as Bifurcation
 from .continuation import Event as Event, NewtonOptions as NewtonOptions, SteppingOptions as SteppingOptions

@@ -33,6 +33,8 @@ class Kind:
     line, width
         Of those that can be followed: colour of the curve in a plane of two parameters, empty for that of its period;
         width as a multiple of the usual one.
+    free_phase
+        Whether its curves consist of motions that no load drives, all those of a system over its last parameter.
     """
 
     words: str
@@ -46,6 +48,7 @@ class Kind:
     choices: Mapping[str, float] | None = None
     line: str = ""
     width: float = 1.0
+    free_phase: bool = False
 
 
 #: in the order of legends
@@ -76,7 +79,7 @@ KINDS: dict[str, Kind] = {
     ),
     "limit_cycle": Kind(
         "limit cycle", (5, 1, 180), "#56B4E9", multiplier=1.0, critical=1, equations="limit_cycle:LimitCycle",
-        choices={}, line="#0072B2",
+        choices={}, line="#0072B2", free_phase=True,
     ),
     "Hopf": Kind(
         "Hopf point", (5, 0, 180), "#009E73", 0.92, critical=2, equations="singular:SingularOperator", line="#009E73"

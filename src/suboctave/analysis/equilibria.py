@@ -72,7 +72,9 @@ def equilibria(
     if highest is not None and not (is_number(highest) and highest > 0.0):
         raise InputError(f"highest must be a positive frequency, not {shortened(highest)}")
     if highest is None and system.n > ALL_EIGENVALUES:
-        raise InputError(f"of {system.n} degrees of freedom say the highest= frequency, rad per unit time, that matters")
+        raise InputError(
+            f"of {system.n} degrees of freedom say the highest= frequency, rad per unit time, that matters"
+        )
     x = np.zeros(system.n) if start is None else numbers_of(start)
     if x.shape != (system.n,):
         raise InputError(f"start must have {system.n} displacements, not shape {x.shape}")

@@ -107,7 +107,7 @@ def limit_cycles(
             raise InputError(f"give bounds=(from, to) of {parameter}")
         bounds = known.bounds(parameter)
     ends = check_bounds(orbit.system, parameter, bounds)
-    if known is not None and "still" in known.known:
+    if isinstance(start, Bifurcation) and "still" in (start.context or {}):
         if start.kind != "Hopf":
             raise InputError(f"an oscillation begins at Hopf points only: this is a {start.kind} of equilibria")
         motion = BranchPoint(_first_cycle(start, parameter, ends, harmonics), None, 0.0, 0, Monodromy())
@@ -148,9 +148,7 @@ def _first_cycle(hopf: Bifurcation, name: str, ends: tuple[float, float], harmon
         found = evaluation.state
         value = found.values[name]
         if abs(found.omega / hopf.kappa - 1.0) <= _SAME and low <= value <= high:
-            return replace(
-                rest, balance=found.balance, x=found.x.copy(), omega=found.omega, values=dict(found.values)
-            )
+            return replace(rest, balance=found.balance, x=found.x.copy(), omega=found.omega, values=dict(found.values))
         reason = f"what was found lies at {curve.where(solved.u)}"
     raise ConvergenceError(
         f"no limit cycle was found beside the Hopf point at {name} = {hopf.parameter(name):.6g}: {reason}"

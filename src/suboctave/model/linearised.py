@@ -10,7 +10,6 @@ from suboctave.model.elements.base import Array
 from suboctave.model.elements.coupled import as_coupled
 from suboctave.model.system import System
 
-
 #: degrees of freedom up to which all eigenvalues are asked for
 ALL_EIGENVALUES = 400
 

@@ -291,6 +291,15 @@ class System:
         return any(element.depends_on_time for element in self.elements)
 
     @property
+    def driven(self) -> bool:
+        """Whether anything sets the frequency of its motions, at its parameters: a load that oscillates, or an element
+        that depends on time.
+        """
+        at = {**self.parameters, "omega": 1.0}
+        loaded = any(c.harmonic > 0 and c.amplitude.value(at) != 0.0 for c in self._components)
+        return loaded or self.excited_by_elements
+
+    @property
     def observed_dof(self) -> int:
         """The degree of freedom watched by default: where the first load acts most (a non-static one if any)."""
         acting = [c.direction for c in sorted(self._components, key=lambda c: c.harmonic == 0)]

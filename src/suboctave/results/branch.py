@@ -350,9 +350,15 @@ class TrackedBranch(Branch):
         return sentence(self.endings, go_on="")
 
     @property
-    def plane(self) -> tuple[str, str]:
-        """The two parameters that it is drawn over: of a curve of extrema the third one and the extreme one."""
-        return (self.names[-1], self.turning) if self.turning else (self.names[0], self.names[1])
+    def plane(self) -> tuple[str, str] | None:
+        """The two parameters that it is drawn over: of a curve of extrema the third one and the extreme one; None of
+        limit cycles, which are drawn over their parameter as responses are.
+        """
+        if self.turning:
+            return self.names[-1], self.turning
+        if KINDS[self.kind].free_phase:
+            return None
+        return (self.names[0], self.names[1]) if len(self.names) == 2 else (self.names[1], self.names[2])
 
     @property
     def extrema(self) -> list[Bifurcation]:
@@ -369,8 +375,10 @@ class TrackedBranch(Branch):
 
     @cached_property
     def kappa(self) -> Array:
-        """Frequency of the critical perturbation along an NS curve, rad per unit time; else zeros; shape (len,)."""
-        return np.array([p.extra if self.kind == "NS" else 0.0 for p in self.tracked])
+        """Frequency of the critical perturbation along a curve of NS or Hopf points, rad per unit time; else zeros;
+        shape (len,).
+        """
+        return np.array([p.extra if self.kind in ("NS", "Hopf") else 0.0 for p in self.tracked])
 
     @cached_property
     def coefficient(self) -> Array:
@@ -398,10 +406,15 @@ class TrackedBranch(Branch):
 
     def _others_inside(self, point: Any) -> bool:
         mu = point.floquet.multipliers
-        target = target_multiplier(self.kind, point.extra * point.orbit.period)
+        target, count = target_multiplier(self.kind, point.extra * point.orbit.period), KINDS[self.kind].critical
+        if KINDS[self.kind].free_phase and self.turning:
+            count += 1
+        elif len(self.names) == 3 and not self.turning:
+            # bifurcations of limit cycles, which have a multiplier +1 besides
+            mu = np.delete(mu, np.abs(mu - 1.0).argmin())
         if target is not None:
             distance = np.minimum(np.abs(mu - target), np.abs(mu - np.conj(target)))
-            mu = np.delete(mu, np.argsort(distance, kind="stable")[: KINDS[self.kind].critical])
+            mu = np.delete(mu, np.argsort(distance, kind="stable")[:count])
         return bool(np.all(np.abs(mu) < 1.0))
 
     @property
@@ -411,7 +424,7 @@ class TrackedBranch(Branch):
     def _columns(self, readings: Iterable[str] | bool) -> dict[str, Any]:
         """As of any branch, and `coefficient`, and `kappa` of an NS curve."""
         own = super()._columns(readings) | {"coefficient": self.coefficient}
-        return own | {"kappa": self.kappa} if self.kind == "NS" else own
+        return own | {"kappa": self.kappa} if self.kind in ("NS", "Hopf") else own
 
     @property
     def _head(self) -> str:

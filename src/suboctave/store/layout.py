@@ -183,7 +183,7 @@ def branch_dataset(branch: Any) -> xarray.Dataset:
         },
     )
     kind = getattr(branch, "kind", None)
-    if kind is None:
+    if kind is None or branch.plane is None:
         return dataset
     meaning = {"long_name": "coefficient of the normal form: a of limit points, c3 of period doublings, else nan"}
     dataset = dataset.assign_attrs(tracked=str(kind), plane="\n".join(branch.plane))

@@ -30,7 +30,7 @@ from suboctave.timedomain.field import Array, Field, default_lengths, scaled_fie
 from suboctave.timedomain.shooting import PeriodicSolution, finish
 from suboctave.timedomain.trajectory import flow
 
-__all__ = ["Curve", "CurvePoint", "locate_by_shooting"]
+__all__ = ["Curve", "CurvePoint", "locate_by_shooting", "shoot_cycle"]
 
 _KINDS = ("LP", "PD", "NS", "BP")
 _CORRECTIONS = 25  # Gauss-Newton steps onto the curve
@@ -38,6 +38,7 @@ _FIRST_STEP = 1e-4  # along the curve, in units of the size of the motion
 _NEARLY_SINGULAR = 1e-5  # relative singular value below which a BP's second direction is left alone
 _NO_BRANCH_POINT = 1e-4
 _IDLE = 3  # iterations without a bracket in which the test function may fail to fall to half
+_CYCLE = 1e-11  # residual of a motion that nothing drives
 _REAL_MULTIPLIER = 1e-5  # imaginary part below which a pair on the unit circle is taken for two real multipliers
 
 
@@ -182,6 +183,28 @@ def locate_by_shooting(
     )
     _confirm(kind, solution, point)
     return solution
+
+
+def shoot_cycle(
+    system: System,
+    state: ArrayLike,
+    omega: float,
+    periods: int = 1,
+    values: Mapping[str, float] | None = None,
+    observe: int | str | None = None,
+    rtol: float = 1e-12,
+) -> PeriodicSolution:
+    """The motion nearest to a state (2n,) and a frequency of a system that nothing drives, both corrected.
+
+    Least-norm corrections leave the phase as it is. Raises ConvergenceError where there is none near.
+    """
+    start = np.array(state, dtype=float)
+    model = scaled_field(system, start, omega, values)
+    curve = Curve(model, periods, rtol, _CYCLE, branch_point=False)
+    point = curve.onto(np.append(start / model.scale, 1.0), None)
+    final = model.at_frequency(point.u[-1] * model.reference)
+    dof = observed_dof(system, observe)
+    return finish(final, point.u[:-1] * model.scale, periods, point.transition, point.residual, 0, dof, rtol)
 
 
 def _drive(

@@ -16,7 +16,7 @@ from suboctave.continuation.newton import null_row
 from suboctave.curves.augmentation import Augmentation
 from suboctave.curves.events.formulation import BORDERED, Formulation
 from suboctave.curves.kinds.extremum import BorderedExtremal, LimitPointExtremal
-from suboctave.curves.kinds.limit_cycle import CycleWith, LimitCycle
+from suboctave.curves.kinds.limit_cycle import CycleWith
 from suboctave.curves.kinds.singular import SingularOperator
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.starts import own_linear_part, settled
@@ -47,7 +47,12 @@ def is_extremum(item: Any) -> TypeGuard[TrackedEvent]:
 
 def on_free_phase(item: Bifurcation) -> bool:
     """Whether something is a bifurcation of motions of a free phase, which has a curve in three parameters."""
-    return isinstance(item, TrackedEvent) and item.kind in ("PD", "NS") and item.curve == LimitCycle.name
+    return (
+        isinstance(item, TrackedEvent)
+        and item.kind in ("PD", "NS")
+        and item.curve in KINDS
+        and KINDS[item.curve].free_phase
+    )
 
 
 def curve_through(

@@ -1,0 +1,229 @@
+"""One motion, or one bifurcation, against shooting from its state at t = 0."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from suboctave.bifurcation.bifurcation import CONTACT_KINDS, Bifurcation, TrackedEvent
+from suboctave.continuation.problem import Array
+from suboctave.curves.trace import BranchPoint
+from suboctave.errors import ConvergenceError, InputError
+from suboctave.floquet.methods import method_of
+from suboctave.harmonic.basis import ComplexArray
+from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.kinds import KINDS
+from suboctave.model.elements.coupled import reads
+from suboctave.model.projected import ProjectedSystem
+from suboctave.model.system import System
+from suboctave.projection import system_of_motions
+from suboctave.timedomain import PeriodicSolution, integrate, locate_by_shooting, shoot, shoot_cycle
+from suboctave.verification.harmonics import left_out, up_to_harmonics
+
+#: the kinds that shooting locates by themselves, along the curve of motions
+LOCATED = ("LP", "BP", "PD", "NS")
+#: how far along the curve of motions one is searched, in tolerances, and the passes through it that may be spent
+_REACH, _PASSES = 100.0, 120
+#: displacements of a motion that are held in memory at once
+_AT_ONCE = 10_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class Verification:
+    """A harmonic-balance motion held against shooting.
+
+    distance
+        Largest difference of the states at t = 0, relative to the motion (displacements by the largest displacement,
+        velocities by the largest velocity; of a projected structure both in the norm of its mass); for a bifurcation
+        also the relative difference in omega, if larger; for a grazing the distance by which the motion misses the gap,
+        relative to the relative displacement, if larger.
+    multiplier_error
+        Largest difference between multipliers, paired.
+    stable
+        The verdict of shooting on the motion's stability, None if no motion was found.
+    agrees
+        Whether shooting arrives at the same motion with the same verdict; at a bifurcation, where no verdict exists,
+        whether it locates one of the same kind at the same place.
+    solution
+        The motion found by shooting, None if it found none (`reason` says why). Of a large structure its state is
+        that of all degrees of freedom, multipliers and monodromy matrix are those of the projection.
+    projection
+        What a large structure was integrated as, in the basis that the motion was solved in; None for one that was
+        taken as it is.
+    """
+
+    distance: float
+    multiplier_error: float
+    stable: bool | None
+    agrees: bool
+    solution: PeriodicSolution | None
+    reason: str
+    projection: ProjectedSystem | None = None
+
+    def __repr__(self) -> str:
+        verdict = "agrees" if self.agrees else "DISAGREES"
+        errors = f"distance {self.distance:.1e}, multipliers {self.multiplier_error:.1e}"
+        basis = "" if self.projection is None else f"\n  {self.projection.words}"
+        return f"Verification: {verdict}; {errors}. {self.reason}{basis}"
+
+
+def verify_motion(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: float) -> Verification:
+    """A motion against shooting, a bifurcation against its location by shooting (`verification.verify`)."""
+    motion = motion_of(what)
+    system = system_of_motions([motion])
+    floquet = (
+        what.floquet if isinstance(what, BranchPoint | Bifurcation) else method_of(None).multipliers(motion.state())
+    )
+    whole = motion.start()
+    start = system.reduced(whole)
+    projection = system if isinstance(system, ProjectedSystem) else None
+    touches = isinstance(what, Bifurcation) and what.kind in CONTACT_KINDS
+    alone = not motion.system.driven
+    kind = what.kind if isinstance(what, Bifurcation) and what.kind in LOCATED and not alone else None
+    try:
+        if alone and np.any(motion.x[1:]):
+            solution = shoot_cycle(system, start, motion.omega, periods=motion.basis.nu)
+        elif kind is None:
+            solution = shoot(system, start, motion.omega, periods=motion.basis.nu)
+        else:
+            solution = _by_shooting(system, motion, kind, start, tolerance)
+    except ConvergenceError as failure:
+        what_failed = "shooting found no motion from here" if kind is None else "shooting did not locate it"
+        return Verification(math.inf, math.inf, None, False, None, f"{what_failed}: {failure}", projection)
+    distance = distance_of(system, motion, start, solution)
+    if isinstance(what, Bifurcation) and touches:
+        distance = max(distance, distance_from_gap(system, what, solution.state, solution.omega))
+    error = pairing(floquet.multipliers, solution.multipliers)
+
+    def verdict(agrees: bool, reason: str) -> Verification:
+        return Verification(
+            distance, error, solution.stable, agrees, recovered_solution(system, solution), reason, projection
+        )
+
+    if kind is not None:
+        words = f"Shooting finds {KINDS[kind].words} at omega = {solution.omega:.9g}"
+        if solution.kind is None:
+            words = f"Shooting sees multipliers cross as at {KINDS[kind].words} close to omega = {solution.omega:.9g}"
+        same = distance <= tolerance
+        return verdict(same, words if same else f"{words}: another one (relative distance {distance:.1e})")
+    if not distance <= tolerance:
+        if not touches and distance <= left_out(motion):
+            return verdict(False, up_to_harmonics(motion, distance))
+        other = "a motion that does not graze" if touches else "another motion"
+        return verdict(False, f"Shooting arrives at {other} (relative distance {distance:.1e})")
+    if alone and isinstance(what, Bifurcation) and what.kind in ("PD", "NS"):
+        critical = what.critical_multiplier()
+        miss = float(np.abs(solution.multipliers - critical).min())
+        words = f"The same motion, with a multiplier {miss:.1e} from {critical:.6g}"
+        return verdict(miss <= tolerance, words)
+    # at an extremum or a point of codimension two, and of what nothing drives, a multiplier is critical: no verdict to
+    # compare
+    if not alone and floquet.stable != solution.stable and not isinstance(what, TrackedEvent):
+        doubt = "" if floquet.decided else ": a multiplier lies within its error of the unit circle"
+        other = "stable" if solution.stable else "unstable"
+        return verdict(False, f"Shooting calls it {other}, harmonic balance the opposite{doubt}")
+    return verdict(
+        True, "The same motion" if alone or isinstance(what, TrackedEvent) else "The same motion, the same verdict"
+    )
+
+
+def distance_of(system: System, motion: PeriodicOrbit, start: Array, solution: PeriodicSolution) -> float:
+    """Of a solution from the motion's state (2n,) at t = 0, relative; of their frequencies, if larger."""
+    away, sizes = _measured(system, solution.state - start), largest_of(motion, system)
+    # a motion at rest differs from another only if that one moves
+    distance = max(float(a.max()) / max(size, np.finfo(float).tiny) for a, size in zip(away, sizes, strict=True))
+    return max(distance, abs(solution.omega - motion.omega) / motion.omega)
+
+
+def largest_of(motion: PeriodicOrbit, system: System) -> tuple[float, float]:
+    """The largest displacement and the largest velocity of a motion as `_measured`."""
+    largest = np.zeros(2)
+    instants = np.linspace(0.0, motion.period, 8 * motion.basis.harmonics + 8)
+    # so many at once that they fit into memory
+    for t in np.array_split(instants, 1 + len(instants) * motion.system.n // _AT_ONCE):
+        states = system.reduced(np.hstack([motion.displacement(t).T, motion.velocity(t).T]))
+        largest = np.maximum(largest, [part.max() for part in _measured(system, states)])
+    return float(largest[0]), float(largest[1])
+
+
+def _measured(system: System, states: Array) -> tuple[Array, Array]:
+    """Sizes of displacements and of velocities, of states (..., 2n) of the system that is integrated.
+
+    Of every degree of freedom its modulus. Of a projected structure, which may have translations, rotations and
+    curvatures among its unknowns, the norm of the mass: the root of twice the kinetic energy, and the same of
+    displacements.
+    """
+    x, v = np.split(np.asarray(states), 2, axis=-1)
+    if not isinstance(system, ProjectedSystem):
+        return np.abs(x), np.abs(v)
+    mass = system.mass.value(system.parameters)
+    norms = (np.sqrt(np.einsum("...i,ij,...j->...", part, mass, part)) for part in (x, v))
+    return next(norms), next(norms)
+
+
+def distance_from_gap(system: System, what: Bifurcation, state: Array, omega: float) -> float:
+    """Distance of the motion's nearest extremum from the gap that it should graze, in units of the displacement."""
+    assert what.contact is not None
+    contact = what.contact
+    period = 2.0 * math.pi * what.orbit.basis.nu / omega
+    path = integrate(system, state, (0.0, period), omega)
+    window = 0.5 * period / (what.orbit.basis.harmonics + 1)
+    direction = reads(system.elements[contact.element], system.n)
+    grid, centre = np.linspace(-1.0, 1.0, 201), contact.time
+    for _ in range(3):  # the window closes on the extremum
+        u = path.at(np.mod(centre + window * grid, period))[0] @ direction
+        a, b, c = np.polyfit(grid, u, 2)
+        at = float(np.clip(-0.5 * b / a, -1.0, 1.0)) if a != 0.0 else 0.0
+        value = float(c + at * b + at**2 * a)
+        centre, window = centre + at * window, 0.1 * window
+    size = float(np.abs(path.at(np.linspace(0.0, period, 200))[0] @ direction).max())
+    return abs(value - contact.gap) / size
+
+
+def recovered_solution(system: System, solution: PeriodicSolution) -> PeriodicSolution:
+    """A motion found by shooting as one of all degrees of freedom."""
+    if not isinstance(system, ProjectedSystem):
+        return solution
+    return replace(solution, state=system.recovered(solution.state)[:], dof=system.watched[solution.dof])
+
+
+def _by_shooting(system: System, motion: PeriodicOrbit, kind: str, start: Array, tolerance: float) -> PeriodicSolution:
+    """The bifurcation located by shooting, or the motion at the same omega.
+
+    The latter where the search loses the multiplier but the count of unstable ones changes as it should within a tenth
+    of the tolerance on either side.
+    """
+    omega, periods = motion.omega, motion.basis.nu
+    try:
+        return locate_by_shooting(system, kind, start, omega, periods=periods, reach=_REACH * tolerance, budget=_PASSES)
+    except ConvergenceError:
+        crossing = {"PD": 1, "NS": 2}.get(kind)
+        if crossing is None:
+            raise
+        sides = [shoot(system, start, omega * (1.0 + s * 0.1 * tolerance), periods=periods) for s in (-1.0, 1.0)]
+        counts = [int(np.count_nonzero(np.abs(side.multipliers) > 1.0)) for side in sides]
+        if abs(counts[1] - counts[0]) != crossing:
+            raise
+        return shoot(system, start, omega, periods=periods)
+
+
+def pairing(computed: ComplexArray, true: ComplexArray, relative: bool = False) -> float:
+    """Largest difference between two sets of multipliers under the best pairing; `relative` to those beyond one."""
+    from scipy.optimize import linear_sum_assignment
+
+    cost = np.abs(computed[:, None] - true[None, :])
+    if relative:
+        cost = cost / np.maximum(1.0, np.abs(true))
+    return float(cost[linear_sum_assignment(cost)].max())
+
+
+def motion_of(what: Any | BranchPoint | Bifurcation) -> PeriodicOrbit:
+    if isinstance(what, PeriodicOrbit):
+        return what
+    if isinstance(what, BranchPoint | Bifurcation):
+        return what.orbit
+    hint = ": take one of its .orbits or .bifurcations" if hasattr(what, "orbits") else ""
+    raise InputError(f"expected a PeriodicOrbit, a point of a branch or a Bifurcation, not {type(what).__name__}{hint}")
