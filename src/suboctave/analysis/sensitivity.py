@@ -21,7 +21,7 @@ from suboctave.analysis.options import Inherited
 from suboctave.bifurcation.bifurcation import Bifurcation, TrackedEvent
 from suboctave.continuation.linear import length, one_thread
 from suboctave.curves.motion import MotionProblem
-from suboctave.curves.tracked.start import curve_through, is_extremum, with_extremum
+from suboctave.curves.tracked.start import curve_through, is_extremum, on_free_phase, with_extremum
 from suboctave.errors import InputError, shortened, suggest
 from suboctave.harmonic.basis import Array
 from suboctave.kinds import TRACKED_KINDS
@@ -188,12 +188,14 @@ def _names(item: Any, parameters: Any) -> tuple[tuple[str, ...], tuple[str, ...]
         raise InputError(f"sensitivity is of a located bifurcation, one of the .bifurcations of a branch, not {given}")
     if is_extremum(item) and len(item.names) != 2:
         raise InputError(f"this extremum lies on a curve in {', '.join(item.names)}: give one in two parameters")
-    if isinstance(item, TrackedEvent) and not is_extremum(item):
+    if isinstance(item, TrackedEvent) and not is_extremum(item) and not on_free_phase(item):
         raise InputError(f"sensitivity is of bifurcations and of extrema along curves of them; this is a {item.kind}")
     if item.kind not in TRACKED_KINDS and not is_extremum(item):
         raise InputError(f"sensitivity is of {', '.join(TRACKED_KINDS)} and extrema; this is a {item.kind}")
     free = item.free_names
-    known = [name for name in ("omega", *item.orbit.system.parameters) if name not in free]
+    # an equilibrium has no omega
+    names = [*([] if "still" in (item.context or {}) else ["omega"]), *item.orbit.system.parameters]
+    known = [name for name in names if name not in free]
     if parameters is None:
         return free, tuple(known)
     if isinstance(parameters, str):

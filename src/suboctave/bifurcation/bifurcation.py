@@ -295,6 +295,8 @@ class BifurcationList:
         for b in self.met:
             mu = b.critical_multiplier()
             text = f"{mu.real:.6f}" + (f"{mu.imag:+.6f}i" if abs(mu.imag) > 1e-7 else "")
+            # of an equilibrium they are those of a frequency that is a matter of the method
+            text = "" if b.kind == "Hopf" else text
             extra = "".join(f"{b.parameter(name):>14.8g}" for name in free)
             remark = b.remark()
             label = b.criticality or ("" if b.normal_form is None else b.normal_form.shape)

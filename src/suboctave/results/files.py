@@ -34,6 +34,7 @@ from suboctave.interruption import Interruption
 from suboctave.model.system import System, build, describe
 from suboctave.results.branch import Branch, TrackedBranch
 from suboctave.results.diagram import BifurcationDiagram, DiagramBranch
+from suboctave.results.equilibria import Equilibria
 from suboctave.store.layout import branch_dataset, events_met
 from suboctave.store.plain import array_of, from_json, padded, recorded, system_arrays
 from suboctave.store.registry import Codec, parts_of, register
@@ -243,7 +244,7 @@ class _Reader:
             kind, names, turning = tracked["kind"], tracked["names"], tracked.get("turning", "")
             branch: Branch = TrackedBranch(kind, names, turning=turning, **given)
         else:
-            branch = Branch(**given)
+            branch = (Equilibria if "still" in given["options"] else Branch)(**given)
         branch.seconds = record["seconds"]
         return branch
 
