@@ -16,7 +16,7 @@ import numpy as np
 from suboctave.analysis.options import CurveOptions, CurveRun, Inherited, check_inside, settings_of
 from suboctave.analysis.subharmonics import check_order, subharmonic_start
 from suboctave.bifurcation.bifurcation import Bifurcation
-from suboctave.bifurcation.bordered import branching_equation, null_vectors
+from suboctave.bifurcation.bordered import at_values, branching_equation, null_vectors
 from suboctave.continuation import CurvePoint, NewtonOptions, SteppingOptions
 from suboctave.continuation.linear import length
 from suboctave.continuation.problem import Array
@@ -36,6 +36,7 @@ from suboctave.model.inputs import check_bounds, check_parameter, check_range, c
 from suboctave.model.system import System
 from suboctave.options import RunOptions, with_options
 from suboctave.results.branch import Branch
+from suboctave.results.equilibria import as_equilibria
 
 
 @with_options(CurveOptions)
@@ -291,7 +292,8 @@ def switch_branch(
     curve = run.curve(orbit.omega, nu, own_linear_part(orbit))
     with run.reporting(options.get("progress"), f"{period_name(nu)} branch along {name}") as run:
         trace = _doubled(bifurcation, curve, side or 1, run) if kind == "PD" else _other(bifurcation, curve, side, run)
-    return run.branch(trace)
+    still = known.known.get("still")
+    return run.branch(trace) if still is None else as_equilibria(run.branch(trace), still)
 
 
 def check_left(kind: str) -> None:
@@ -379,6 +381,11 @@ def _scale_from_rest(curve: MotionProblem, u: Array, direction: Array) -> None:
     change = balance.shaped(phi)
     slope = rest.force_jacobian @ change.ravel()
     linear = length(rest.linear_jacobian @ phi) + length(slope)
+    # of what stands still they vanish at the point itself: those a little beside it
+    value, little = float(u[curve.parameter]), _NOTICED * curve.span
+    for aside in (value - little, value + little):
+        frequency, parameters = at_values(values, curve.name, aside, omega)
+        linear = max(linear, length(balance.at(x, frequency, parameters).jacobian @ phi))
     unit = curve.size(curve.join(change, 0.0))
     for size in np.geomspace(1e-12, 1e12, 145):
         bent = balance.at(x + size * change, omega, values).force - rest.force

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any, Unpack
 
 import numpy as np
@@ -10,7 +9,6 @@ from numpy.typing import ArrayLike
 
 from suboctave.analysis.branches import from_end
 from suboctave.analysis.options import CurveOptions, CurveRun, settings_of
-from suboctave.bifurcation.bifurcation import BifurcationList
 from suboctave.curves.hopf import BEYOND, STILL
 from suboctave.errors import ConvergenceError, InputError, is_number, shortened
 from suboctave.harmonic.basis import Array
@@ -18,8 +16,7 @@ from suboctave.model.inputs import check_bounds, check_is_system, check_paramete
 from suboctave.model.linearised import ALL_EIGENVALUES, eigenvalues
 from suboctave.model.system import System
 from suboctave.options import with_options
-from suboctave.results.branch import Branch
-from suboctave.results.equilibria import Equilibria
+from suboctave.results.equilibria import Equilibria, as_equilibria
 
 #: share of half the frequency that equilibria are written with which theirs may reach; tries to find one high enough
 _BELOW, _TRIES = 0.9, 4
@@ -116,17 +113,3 @@ def check_undriven(system: System) -> None:
             names = sorted(set(load.amplitude.names) - {"omega"})
             change = f" (here by {', '.join(names)})" if names else ""
             raise InputError(f"a load drives this system: leave its loads out, or make them zero{change}")
-
-
-def as_equilibria(branch: Branch, omega: float) -> Equilibria:
-    """A branch of equilibria, written with a frequency, as such: its Neimark-Sacker points are Hopf points."""
-    options = {**branch.options, "still": omega}
-    own = ("system", "name", "points", "closed", "endings", "observe", "warnings", "audit", "departs", "arrives")
-    met = []
-    for item in branch.bifurcations.met:
-        context = {**(item.context or {}), "still": omega}
-        met.append(replace(item, kind="Hopf" if item.kind == "NS" else item.kind, context=context))
-    given = {name: getattr(branch, name) for name in own}
-    result = Equilibria(**given, bifurcations=met, events=list(branch.events.met), options=options)
-    result.bifurcations = BifurcationList(met)
-    return result

@@ -15,13 +15,13 @@ from suboctave.continuation.linear import length
 from suboctave.continuation.newton import NewtonOptions, correct
 from suboctave.curves.hopf import shape_of
 from suboctave.curves.motion import MotionEvaluation
-from suboctave.curves.starts import rule_of
+from suboctave.curves.starts import own_linear_part, rule_of
 from suboctave.curves.trace import BranchPoint
 from suboctave.curves.tracked.start import curve_through
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.floquet.methods import Monodromy
 from suboctave.harmonic.basis import Array, HarmonicBasis
-from suboctave.harmonic.evaluation import BalanceState
+from suboctave.harmonic.evaluation import BalanceState, HarmonicBalance
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.truncation import AdaptiveHarmonics
 from suboctave.model.inputs import check_bounds, check_parameter, timed
@@ -48,6 +48,7 @@ def limit_cycles(
     *,
     omega: tuple[float, float] | None = None,
     harmonics: int | str | AdaptiveHarmonics = "adaptive",
+    unloaded: bool = False,
     **options: Unpack[TrackOptions],
 ) -> TrackedBranch:
     """Oscillations that nothing drives, over a parameter: frequency, stability, and their bifurcations.
@@ -58,8 +59,7 @@ def limit_cycles(
     Parameters
     ----------
     start
-        A "Hopf" of `equilibria`; or a motion that no load drives, or nearly one: of a branch along the load at its
-        value zero, for example.
+        A "Hopf" of `equilibria`; or a motion near a cycle: an orbit, a point of a branch.
     bounds
         Range of the parameter (from, to); from a Hopf point default that of its equilibria.
     parameter
@@ -68,6 +68,9 @@ def limit_cycles(
         Range of their frequency, rad per unit time; default: not bounded.
     harmonics
         As in `frequency_response`, of the cycle's own frequency.
+    unloaded
+        Leaves the oscillating loads of the system out: from a response to a small load to the cycle beside it. The
+        system of the result then has a parameter `load_scale` of value 0.
 
     Returns
     -------
@@ -83,35 +86,44 @@ def limit_cycles(
     ConvergenceError
         If no cycle is found beside the start.
     """
-    if isinstance(start, PeriodicOrbit):
-        motion: Any = BranchPoint(start, None, 0.0, 0, Monodromy())
-        orbit = start
-    elif isinstance(start, Bifurcation | BranchPoint):
-        motion, orbit = start, start.orbit
-    else:
+    if not isinstance(start, Bifurcation | BranchPoint | PeriodicOrbit):
         raise InputError(
-            f"limit cycles begin at a Hopf point (equilibria(...).bifurcations) or at a motion, not at "
+            "limit cycles begin at a Hopf point (equilibria(...).bifurcations) or at a motion, not at "
             f"{type(start).__name__}"
         )
+    item = start if isinstance(start, Bifurcation) else None
+    orbit = start if isinstance(start, PeriodicOrbit) else start.orbit
+    if unloaded:
+        orbit = _without_loads(orbit)
     check_undriven(orbit.system)
-    known = Inherited(start) if isinstance(start, Bifurcation) else None
-    if length(orbit.x[1:].ravel()) <= _STILL * length(orbit.x.ravel()) and getattr(start, "kind", "") != "Hopf":
+    if item is not None and item.kind != "Hopf" and "still" in (item.context or {}):
+        raise InputError(f"an oscillation begins at Hopf points only: this is a {item.kind} of equilibria")
+    hopf = item if item is not None and item.kind == "Hopf" else None
+    if hopf is None and length(orbit.x[1:].ravel()) <= _STILL * length(orbit.x.ravel()):
         raise InputError("nothing moves there: limit cycles begin at Hopf points, or at a motion")
     if parameter is None:
-        if not isinstance(start, Bifurcation) or start.parameter_name == "omega":
+        if item is None or item.parameter_name == "omega":
             raise InputError("name the parameter= over which the cycles are followed")
-        parameter = start.parameter_name
+        parameter = item.parameter_name
     check_parameter(orbit.system, parameter)
     if bounds is None:
-        if known is None:
+        if item is None:
             raise InputError(f"give bounds=(from, to) of {parameter}")
-        bounds = known.bounds(parameter)
+        bounds = Inherited(item).bounds(parameter)
     ends = check_bounds(orbit.system, parameter, bounds)
-    if isinstance(start, Bifurcation) and "still" in (start.context or {}):
-        if start.kind != "Hopf":
-            raise InputError(f"an oscillation begins at Hopf points only: this is a {start.kind} of equilibria")
-        motion = BranchPoint(_first_cycle(start, parameter, ends, harmonics), None, 0.0, 0, Monodromy())
+    if hopf is not None:
+        orbit = _first_cycle(hopf, parameter, ends, harmonics)
+    # multipliers are computed when asked for
+    motion = BranchPoint(orbit, None, 0.0, 0, Monodromy())
     return track(motion, parameter, ends, omega=omega, onto="limit_cycle", harmonics=harmonics, **options)
+
+
+def _without_loads(orbit: PeriodicOrbit) -> PeriodicOrbit:
+    """A motion as one of the system whose oscillating loads are zero."""
+    system, name = orbit.system, "load_scale"
+    without = system.with_scaled_loads(name).with_parameters({name: 0.0})
+    balance = HarmonicBalance(without, orbit.basis, linear=own_linear_part(orbit))
+    return replace(orbit, balance=balance, values={**orbit.values, name: 0.0})
 
 
 def _first_cycle(hopf: Bifurcation, name: str, ends: tuple[float, float], harmonics: Any) -> PeriodicOrbit:

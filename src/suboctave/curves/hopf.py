@@ -7,6 +7,8 @@ of eigenvalues i Omega is a Neimark-Sacker point with kappa = Omega: what holds 
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from suboctave.bifurcation.bifurcation import TrackedEvent
@@ -46,13 +48,19 @@ def hopf_beside(a: Sample, b: Sample) -> TrackedEvent:
     moved = abs(guess.value(state) - guess.parameter) / curve.span, abs(found.kappa / rate - 1.0)
     if max(moved) > _BESIDE:
         raise ConvergenceError(f"the Hopf point found lies elsewhere, at {name} = {guess.value(state):.6g}")
-    orbit = PeriodicOrbit(
-        state.balance, state.x.copy(), state.omega, dict(state.values), found.balance_residual, truncation(state), None
-    )
+    known = dict(state.values), found.balance_residual, truncation(state)
+    orbit = stilled(PeriodicOrbit(state.balance, state.x, state.omega, *known, None))
     return TrackedEvent(
         "Hopf", orbit, found.floquet, found.residual, 0.0, name, found.vectors, found.kappa,
         curve=curve.augmentation.name, names=curve.names,
     )  # fmt: skip
+
+
+def stilled(orbit: PeriodicOrbit) -> PeriodicOrbit:
+    """An equilibrium without what rounding leaves of an oscillation."""
+    x = orbit.x.copy()
+    x[1:] = 0.0
+    return replace(orbit, x=x)
 
 
 def shape_of(hopf_vector: np.ndarray, size: int, scale: Array) -> Array:

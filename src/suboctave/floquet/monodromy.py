@@ -37,6 +37,9 @@ At a limit point there is no such step: a motion of the same frequency is far aw
 moves along the direction of the multiplier near +1 is then left out, and belongs to the error: with the gap
 `g = 1 - mu` and the shift D of the multiplier to first order, the motions near a fold leave `g^2 - 2 g D` for the
 square of the gap, so that the shift is at most about `sqrt(2 g |D|)`.
+
+Where nothing drives a motion, it may be shifted in time: the multiplier of that direction is +1, and what the step
+moves along it, which changes the phase alone, is left out.
 """
 
 from __future__ import annotations
@@ -185,6 +188,7 @@ class _Linearised:
         self._structures = structure(self.spans, self._stretch, self._forms)
         self._acting = np.empty((len(self.spans), channels), dtype=bool)
         self._solved = np.empty((len(self.spans), channels * ORDER, size + 1))
+        self._states = np.empty((len(self.spans), blocks.first[dynamic], size + 1))
         self._whole = self._march(self.law, np.zeros(self.base.shape), size + 1)
         self.before, self._start = np.empty((size, size)), np.empty((size, 1))
         closed(self._whole, self._kept, self.before, self._start)
@@ -233,7 +237,7 @@ class _Linearised:
         total = np.zeros((blocks.first[self._dynamic], columns))
         march(
             self._structures, self._stretch, self._forms, law, self.loose, kick, self.active, total, self._kept,
-            self._acting, self._solved,
+            self._acting, self._solved, self._states,
         )  # fmt: skip
         return total
 
@@ -274,6 +278,21 @@ class _Linearised:
         moved += 1e-15 * np.abs(exponents) + self.rounding
         return mu, np.abs(mu) * moved + math.exp(_FORGOTTEN)
 
+    @property
+    def driven(self) -> bool:
+        """Whether a load or an element sets the phase of the motion."""
+        return bool(self.state.load[1:].any()) or self.state.balance.system.excited_by_elements
+
+    def _still(self) -> Array:
+        """Where the periodic response begins, (N, 1), with the least change of the phase: nothing along the singular
+        vector of `1 - monodromy` that is the shift in time.
+        """
+        closing, kick = np.eye(self.size) - self.before, self._whole[self._kept, self.size]
+        left, sizes, right = np.linalg.svd(closing)
+        kept = sizes > _SHIFTED * sizes[0]
+        kept[-1] = False
+        return right[kept].T @ ((left.T @ kick)[kept] / sizes[kept])[:, None]
+
     def multipliers(self, weight: float) -> tuple[ComplexArray, Array, float]:
         """Multipliers, how far the correction has moved them, and blocks without states may, (2, N), and the share of
         the correction that was taken.
@@ -283,10 +302,12 @@ class _Linearised:
         share, start = 1.0, self._start
         change = np.zeros_like(self.path)
         if len(self.active):
-            if weight < 1.0:
+            if not self.driven:
+                start = self._still()
+            elif weight < 1.0:
                 start = start - (1.0 - weight) * (projector(self.before) @ start)
             share = response(
-                self._structures, self._stretch, self._forms, self.active, self._acting, self._solved, start,
+                self._structures, self._stretch, self._forms, self.active, self._acting, self._solved, self._states, start,
                 self._whole, self._kept, self.path, _LARGEST, change,
             )  # fmt: skip
         law, kick = self._changed(change)
@@ -492,6 +513,8 @@ def _probe(law: Smoothness, levels: tuple[float, ...], motion: ComplexArray) -> 
     return Probe(np.array(pieces).reshape(-1, 3), rough, [_ROUGH * size] * len(rough))
 
 
+#: singular value of `1 - monodromy`, as a share of the largest, of a direction that is left as it is
+_SHIFTED = 1e-6
 #: a correction larger than this share of the motion is cut down to it
 _LARGEST = 0.1
 #: shift of a multiplier in units of its distance to +1 that leaves doubt whether the first order tells it
@@ -526,6 +549,7 @@ def _of_equation(state: BalanceState) -> FloquetResult:
 
 def _with_states(motion: _Linearised) -> tuple[ComplexArray, Array]:
     """Multipliers and errors of the blocks that have states."""
+    driven = motion.driven
     mu, shift, share = motion.multipliers(1.0)
     # there are few: numbers are quicker than arrays
     values, shifts = mu.tolist(), shift[0].tolist()
@@ -534,7 +558,7 @@ def _with_states(motion: _Linearised) -> tuple[ComplexArray, Array]:
     nearest = min(range(len(values)), key=lambda i: abs(1.0 - values[i]) - shifts[i])
     distance = abs(1.0 - values[nearest])
     moved = shifts[nearest] / share if share > 0.0 else math.inf
-    if moved > _DOUBTFUL * distance:
+    if driven and moved > _DOUBTFUL * distance:
         mu, shift, share = _beside_fold(motion, moved)
     # where the correction had to be cut, the motion is not near enough to a true one to say much
     cut = 1.0 / share - 1.0 if share > 0.0 else math.inf

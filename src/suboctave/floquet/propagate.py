@@ -172,7 +172,7 @@ def _kick(amount, read, driven, total):
 
 
 @kernel(fastmath=_FAST, error_model="numpy")
-def march(structures, stretch, forms, law, loose, kick, active, total, kept, acting, solved):
+def march(structures, stretch, forms, law, loose, kick, active, total, kept, acting, solved, states):
     """Perturbations along the panels of one period, and with them the response to the forces r.
 
     Parameters
@@ -192,6 +192,8 @@ def march(structures, stretch, forms, law, loose, kick, active, total, kept, act
     acting, solved
         Which channels have stiffness or damping on which panels, (P, G), and all forces at the nodes,
         (P, G m, kept + 1); empty without r. Of channels that do not act the last column alone is there.
+    states
+        Those that the panels begin with on which channels act, (P, S, kept + 1), with r.
 
     Notes
     -----
@@ -224,6 +226,9 @@ def march(structures, stretch, forms, law, loose, kick, active, total, kept, act
             if kick[active[g], p] != 0.0:
                 _kick(kick[active[g], p], reading[d, 0, g * m], driven[:, g], total)
         if count > 0:
+            for s in range(size if forced else 0):
+                for j in range(columns):
+                    states[p, s, j] = total[s, j]
             _solve(reading[d], influence[d], total, values, acts, rows, count, moving, forced, a, seen, f, speed)
             _turn(moved[d], first, 0, columns, total)
             into = packed[: size * count].reshape(size, count)
@@ -255,12 +260,12 @@ def march(structures, stretch, forms, law, loose, kick, active, total, kept, act
 
 
 @kernel(fastmath=_FAST, error_model="numpy")
-def response(structures, stretch, forms, active, acting, solved, start, whole, kept, path, largest, out):
+def response(structures, stretch, forms, active, acting, solved, states, start, whole, kept, path, largest, out):
     """q, q' at the nodes along all channels into `out` (C, 2, N), which is zero, of the response that begins with the
     kept states `start` (kept, 1); returns the share of it that is left: none is larger than `largest` times the
     displacement.
 
-    structures, stretch, forms, active, acting, solved: see `march`; whole (S, kept + 1): states at the end of the
+    structures, stretch, forms, active, acting, solved, states: see `march`; whole (S, kept + 1): states at the end of the
     period, kept (kept,): which of them these are; path (C, 2, N): the motion along all channels.
     """
     kinds, moved, reading, influence, entering = structures
@@ -278,6 +283,14 @@ def response(structures, stretch, forms, active, acting, solved, start, whole, k
             now = stretch[p]
             if forms.turning[now]:
                 state = np.dot(forms.turns[now], state)
+        acts = False
+        for g in range(groups):
+            acts = acts or acting[p, g]
+        # without its forces the structure may grow, and what rounding leaves with it
+        for s in range(size if acts else 0):
+            state[s, 0] = states[p, s, free]
+            for i in range(free):
+                state[s, 0] += states[p, s, i] * start[i, 0]
         for row in range(groups * m):
             force[row] = solved[p, row, free]
             for i in range(free if acting[p, row // m] else 0):

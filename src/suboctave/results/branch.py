@@ -373,6 +373,11 @@ class TrackedBranch(Branch):
         """
         return np.array([self._others_inside(p) for p in self.points], dtype=bool)
 
+    @property
+    def verdicts(self) -> str:
+        """At how many points another multiplier than the critical ones lies outside the unit circle, in words."""
+        return f"{int(np.count_nonzero(~self.stable))} unstable"
+
     @cached_property
     def kappa(self) -> Array:
         """Frequency of the critical perturbation along a curve of NS or Hopf points, rad per unit time; else zeros;

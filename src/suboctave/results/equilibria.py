@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from suboctave.curves.hopf import stilled
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.model.linearised import ALL_EIGENVALUES, eigenvalues
 from suboctave.results.branch import Branch
@@ -81,3 +83,17 @@ class Equilibria(Branch):
             )
         table = rows if len(rows) > 1 else ["no bifurcations"]
         return "\n".join([self._head, *(f"  {words}" for words in self.basis), *notes, *table])
+
+
+def as_equilibria(branch: Branch, omega: float) -> Equilibria:
+    """A branch of equilibria, written with a frequency, as such: its Neimark-Sacker points are Hopf points."""
+    options = {**branch.options, "still": omega}
+    own = ("system", "name", "points", "closed", "endings", "observe", "warnings", "audit", "departs", "arrives")
+    met = []
+    for item in branch.bifurcations.met:
+        context = {**(item.context or {}), "still": omega}
+        kind = "Hopf" if item.kind == "NS" else item.kind
+        met.append(replace(item, kind=kind, orbit=stilled(item.orbit), context=context))
+    given = {name: getattr(branch, name) for name in own}
+    given["points"] = [replace(point, orbit=stilled(point.orbit)) for point in branch.points]
+    return Equilibria(**given, bifurcations=met, events=list(branch.events.met), options=options)

@@ -193,18 +193,26 @@ def shoot_cycle(
     values: Mapping[str, float] | None = None,
     observe: int | str | None = None,
     rtol: float = 1e-12,
+    corrected: bool = True,
 ) -> PeriodicSolution:
     """The motion nearest to a state (2n,) and a frequency of a system that nothing drives, both corrected.
 
-    Least-norm corrections leave the phase as it is. Raises ConvergenceError where there is none near.
+    Least-norm corrections leave the phase as it is. Without corrections (at a limit point there may be no motion of
+    these parameters beside it) `residual` is by how much, relative to the motion, it misses its beginning after a
+    period. Raises ConvergenceError where there is none near.
     """
     start = np.array(state, dtype=float)
     model = scaled_field(system, start, omega, values)
     curve = Curve(model, periods, rtol, _CYCLE, branch_point=False)
-    point = curve.onto(np.append(start / model.scale, 1.0), None)
-    final = model.at_frequency(point.u[-1] * model.reference)
-    dof = observed_dof(system, observe)
-    return finish(final, point.u[:-1] * model.scale, periods, point.transition, point.residual, 0, dof, rtol)
+    u, dof = np.append(start / model.scale, 1.0), observed_dof(system, observe)
+    if corrected:
+        point = curve.onto(u, None)
+        u, transition, residual = point.u, point.transition, point.residual
+    else:
+        defect, _, transition = curve.evaluate(u)
+        residual = float(np.max(np.abs(defect)))
+    final = model.at_frequency(u[-1] * model.reference)
+    return finish(final, u[:-1] * model.scale, periods, transition, residual, 0, dof, rtol)
 
 
 def _drive(

@@ -85,7 +85,8 @@ def verify_motion(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: fl
     kind = what.kind if isinstance(what, Bifurcation) and what.kind in LOCATED and not alone else None
     try:
         if alone and np.any(motion.x[1:]):
-            solution = shoot_cycle(system, start, motion.omega, periods=motion.basis.nu)
+            folds = isinstance(what, Bifurcation) and what.kind in ("LP", "BP")
+            solution = shoot_cycle(system, start, motion.omega, periods=motion.basis.nu, corrected=not folds)
         elif kind is None:
             solution = shoot(system, start, motion.omega, periods=motion.basis.nu)
         else:
@@ -93,7 +94,7 @@ def verify_motion(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: fl
     except ConvergenceError as failure:
         what_failed = "shooting found no motion from here" if kind is None else "shooting did not locate it"
         return Verification(math.inf, math.inf, None, False, None, f"{what_failed}: {failure}", projection)
-    distance = distance_of(system, motion, start, solution)
+    distance = max(distance_of(system, motion, start, solution), solution.residual)
     if isinstance(what, Bifurcation) and touches:
         distance = max(distance, distance_from_gap(system, what, solution.state, solution.omega))
     error = pairing(floquet.multipliers, solution.multipliers)
@@ -114,11 +115,8 @@ def verify_motion(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: fl
             return verdict(False, up_to_harmonics(motion, distance))
         other = "a motion that does not graze" if touches else "another motion"
         return verdict(False, f"Shooting arrives at {other} (relative distance {distance:.1e})")
-    if alone and isinstance(what, Bifurcation) and what.kind in ("PD", "NS"):
-        critical = what.critical_multiplier()
-        miss = float(np.abs(solution.multipliers - critical).min())
-        words = f"The same motion, with a multiplier {miss:.1e} from {critical:.6g}"
-        return verdict(miss <= tolerance, words)
+    if alone and isinstance(what, Bifurcation) and what.kind in LOCATED:
+        return verdict(*_as_critical(what, solution, tolerance))
     # at an extremum or a point of codimension two, and of what nothing drives, a multiplier is critical: no verdict to
     # compare
     if not alone and floquet.stable != solution.stable and not isinstance(what, TrackedEvent):
@@ -128,6 +126,24 @@ def verify_motion(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: fl
     return verdict(
         True, "The same motion" if alone or isinstance(what, TrackedEvent) else "The same motion, the same verdict"
     )
+
+
+def _as_critical(what: Bifurcation, solution: PeriodicSolution, tolerance: float) -> tuple[bool, str]:
+    """Whether a motion that nothing drives has the multiplier that makes it a bifurcation, and in words; a second +1 at
+    a limit or branch point, where two that meet part like the square root of what is missed.
+    """
+    folds = what.kind in ("LP", "BP")
+    critical = 1.0 if folds else what.critical_multiplier()
+    apart = np.sort(np.abs(solution.multipliers - critical))
+    miss = float(apart[1] if folds else apart[0])
+    allowed = math.sqrt(tolerance) if folds else tolerance
+    words = f"The same motion, with a {'second ' if folds else ''}multiplier {miss:.1e} from {critical:.6g}"
+    if folds and solution.residual > tolerance:
+        return (
+            False,
+            f"From there the motion misses its beginning after a period by {solution.residual:.1e} of its size",
+        )
+    return miss <= allowed, words
 
 
 def distance_of(system: System, motion: PeriodicOrbit, start: Array, solution: PeriodicSolution) -> float:

@@ -31,10 +31,11 @@ _RESEMBLES = 0.5
 
 @dataclass(frozen=True)
 class LimitCycle(Augmentation):
-    """Y is `reference`, coefficients (2 H + 1, size) in `basis`."""
+    """Y is `reference`, coefficients (2 H + 1, size) in `basis`; `size` that of the motions' oscillation."""
 
     reference: Array
     basis: HarmonicBasis
+    size: float
     name = "limit_cycle"
     free_phase = True
 
@@ -43,7 +44,7 @@ class LimitCycle(Augmentation):
         """With the phase of a motion."""
         if state.load[1:].any():
             raise InputError("a load drives this motion: only motions that no load keeps going choose their frequency")
-        return cls(state.x, state.basis)
+        return cls(state.x, state.basis, length(oscillating(state)) or 1.0)
 
     @classmethod
     def through(cls, item: Bifurcation, state: BalanceState, names: tuple[str, ...]) -> tuple[LimitCycle, Array]:
@@ -68,7 +69,7 @@ def oscillating(state: BalanceState) -> Array:
 
 
 class CycleEquations(Equations):
-    """The phase condition, relative to both motions."""
+    """The phase condition, relative to the reference and to the motion."""
 
     def __init__(self, of: LimitCycle, state: BalanceState, names: tuple[str, ...]) -> None:
         self.of, self.state, self.names = of, state, names
@@ -80,7 +81,7 @@ class CycleEquations(Equations):
         self.turning[1::2], self.turning[2::2] = k * reference[2::2], -k * reference[1::2]
         reference[0] = 0.0
         self.reference = reference
-        self.unit = (length(self.turning) or 1.0) * (length(oscillating(state)) or 1.0)
+        self.unit = (length(self.turning) or 1.0) * of.size
 
     @property
     def values(self) -> Array:
@@ -93,8 +94,9 @@ class CycleEquations(Equations):
 
     def renewed(self) -> LimitCycle:
         x, y = oscillating(self.state), self.reference
-        alike = float(np.vdot(x, y)) > _RESEMBLES * length(x) * length(y)
-        return self.of if alike else LimitCycle.of(self.state)
+        size = length(x)
+        alike = float(np.vdot(x, y)) > _RESEMBLES * size * length(y)
+        return replace(self.of, size=size) if alike else LimitCycle.of(self.state)
 
 
 @dataclass(frozen=True)

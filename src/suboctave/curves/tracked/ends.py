@@ -32,7 +32,7 @@ from suboctave.curves.augmentation import Augmentation
 from suboctave.curves.hopf import hopf_beside
 from suboctave.curves.junction import NOTHING_LEFT, doubled_size, subharmonic_share
 from suboctave.curves.kinds.branch_point import BranchPointUnfolded
-from suboctave.curves.kinds.limit_cycle import oscillating
+from suboctave.curves.kinds.limit_cycle import LimitCycle, oscillating
 from suboctave.curves.kinds.singular import SingularOperator
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.sample import Sample
@@ -148,6 +148,10 @@ def _own_part(sample: Sample) -> Array:
 def _in_its_parent(a: Sample, b: Sample) -> End:
     if b.state.basis.nu % 2 == 0:
         return End(f"the doubled part of the motions vanishes between {a.where} and {b.where}: in a period doubling")
+    if a.curve.augmentation.turning:
+        return End(f"the oscillation vanishes between {a.where} and {b.where}: in a generalised Hopf (Bautin) point")
+    if a.curve.augmentation.name != LimitCycle.name:
+        return End(f"the oscillation vanishes between {a.where} and {b.where}")
     try:
         hopf = hopf_beside(a, b)
         one, other = (length(oscillating(sample.state)) for sample in (a, b))

@@ -1,0 +1,144 @@
+"""Equilibria against closed forms: eigenvalues, Hopf points, buckling; curves of these; what is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import suboctave as so
+from suboctave.model.linearised import eigenvalues, tangent_matrices
+
+pytestmark = pytest.mark.filterwarnings("ignore::suboctave.NegativeDampingWarning")
+
+
+@pytest.fixture(scope="module")
+def wing():
+    """A section in plunge and pitch under quasi-steady lift, its stiffness in pitch softening, then hardening."""
+    return so.System.from_equations(
+        [
+            "h'' + xa*a'' + 2*zeta*w*h' + w**2*h + beta*U**2*a + beta*U*h' = 0",
+            "xa*h'' + r2*a'' + 2*zeta*r2*a' + r2*(a - k3*a**3 + k5*a**5) - beta*e*U**2*a - beta*e*U*h' = 0",
+        ],
+        {"xa": 0.2, "r2": 0.25, "zeta": 0.01, "w": 0.5, "beta": 0.1, "e": 0.2, "k3": 2.0, "k5": 20.0, "U": 0.5},
+    )
+
+
+def test_a_hopf_point_and_eigenvalues_in_closed_form():
+    system = so.System.from_equations("x'' + (x**2 - mu)*x' + 4*x = 0", {"mu": 0.1})
+    found = so.equilibria(system, "mu", (-1.0, 1.0))
+    (hopf,) = found.bifurcations["Hopf"]
+    assert abs(hopf.parameters["mu"]) < 1e-12
+    assert hopf.omega == pytest.approx(2.0, rel=1e-12)
+    assert hopf.criticality == "supercritical"
+    mu = found.parameter("mu")
+    expected = 0.5 * mu + 1j * np.sqrt(4.0 - 0.25 * mu**2)
+    np.testing.assert_allclose(found.eigenvalues[:, 0], expected, rtol=1e-10)
+    np.testing.assert_array_equal(found.stable, mu < 0.0)
+    assert not found.positions.any()
+
+
+@pytest.mark.parametrize("a", [0.1, -0.1])
+def test_the_criticality_is_that_of_the_first_lyapunov_coefficient(a):
+    """By averaging a A^2 3/4 is added to the growth: a > 0 subcritical."""
+    system = so.System.from_equations("x'' + x - mu*x' - a*x'**3 + x'**5 = 0", {"mu": 0.0, "a": a})
+    (hopf,) = so.equilibria(system, "mu", (-0.1, 0.1)).bifurcations["Hopf"]
+    assert hopf.criticality == ("subcritical" if a > 0.0 else "supercritical")
+
+
+def test_flutter_against_the_characteristic_polynomial(wing):
+    found = so.equilibria(wing, "U", (0.2, 2.5))
+    (hopf,) = found.bifurcations["Hopf"]
+    at = {**wing.parameters, "U": hopf.parameters["U"]}
+    mass, damping, stiffness = tangent_matrices(wing, np.zeros(2), at)
+    s = 1j * hopf.omega
+    matrix = s**2 * mass + s * damping + stiffness
+    assert abs(np.linalg.det(matrix)) < 1e-12
+    # whatever the frequency that the equilibria are written with
+    other = so.equilibria(wing, "U", (0.2, 2.5), highest=7.0).bifurcations["Hopf"][0]
+    assert other.parameters["U"] == pytest.approx(hopf.parameters["U"], rel=1e-11)
+    assert other.omega == pytest.approx(hopf.omega, rel=1e-11)
+
+
+def test_the_curve_of_hopf_points_in_two_parameters(wing):
+    (hopf,) = so.equilibria(wing, "U", (0.2, 2.5)).bifurcations["Hopf"]
+    curve = so.track(hopf, "zeta", (0.001, 0.05))
+    assert curve.kind == "Hopf"
+    assert curve.plane == ("U", "zeta")
+    for i in (0, len(curve) // 2, -1):
+        values = curve.orbits[i].values
+        found = eigenvalues(wing, np.zeros(2), values)
+        nearest = found[np.argmin(np.abs(found - 1j * curve.kappa[i]))]
+        assert abs(nearest - 1j * curve.kappa[i]) < 1e-9
+
+
+def test_buckling_is_a_branch_point_and_the_branch_is_switched_to():
+    """x^2 = mu beyond mu = 0; imperfect, a limit point."""
+    system = so.System.from_equations("x'' + 0.1*x' - mu*x + x**3 = q", {"mu": -0.5, "q": 0.0})
+    found = so.equilibria(system, "mu", (-1.0, 1.0))
+    (point,) = found.bifurcations["BP"]
+    assert abs(point.parameters["mu"]) < 1e-9
+    assert point.criticality == "supercritical"
+    other = so.switch_branch(point, side=1)
+    mu = other.parameter("mu")
+    np.testing.assert_allclose(other.positions[:, 0] ** 2, mu, atol=1e-9)
+    assert other.stable[5:].all()
+    imperfect = system.with_parameters(q=-0.1)
+    folded = so.equilibria(imperfect, "mu", (1.0, -1.0), start=[0.95])
+    (fold,) = folded.bifurcations["LP"]
+    # q = -mu x + x^3 with mu = 3 x^2
+    x = 0.05 ** (1.0 / 3.0)
+    assert fold.parameters["mu"] == pytest.approx(3.0 * x**2, rel=1e-9)
+    curve = so.track(fold, "q", (-0.3, 0.05))
+    np.testing.assert_allclose(curve.parameter("mu") ** 3, 6.75 * curve.parameter("q") ** 2, atol=1e-9)
+
+
+def test_frequencies_beyond_those_at_the_start_are_noticed():
+    """A stiffness that grows along the curve: the frequency that equilibria are written with follows."""
+    system = so.System.from_equations(
+        ["x'' + 0.1*x' + x = 0", "y'' - mu*y' + y**2*y' + k**2*y + 0*x = 0"], {"mu": -0.1, "k": 1.0}
+    )
+    found = so.equilibria(system, "k", (1.0, 60.0))
+    assert found.omega[0] > 2.0 * 60.0
+    assert not found.bifurcations.met
+    (hopf,) = so.equilibria(system.with_parameters(k=60.0), "mu", (-0.1, 0.1)).bifurcations["Hopf"]
+    assert hopf.omega == pytest.approx(60.0, rel=1e-10)
+
+
+def test_sensitivities_of_a_hopf_point(wing):
+    (hopf,) = so.equilibria(wing, "U", (0.2, 2.5)).bifurcations["Hopf"]
+    found = so.sensitivity(hopf, ["zeta", "e"])
+    for name in ("zeta", "e"):
+        step = 1e-5 * wing.parameters[name]
+        sides = [
+            so.equilibria(wing.with_parameters({name: wing.parameters[name] + s * step}), "U", (0.2, 2.5))
+            for s in (1.0, -1.0)
+        ]
+        ahead, behind = (side.bifurcations["Hopf"][0].parameters["U"] for side in sides)
+        assert found[name]["U"] == pytest.approx((ahead - behind) / (2.0 * step), rel=1e-5)
+
+
+def test_what_is_found_is_kept(tmp_path, wing):
+    found = so.equilibria(wing, "U", (0.2, 2.5), observe="a")
+    found.save(tmp_path / "rest.nc")
+    again = so.load(tmp_path / "rest.nc")
+    assert repr(again) == repr(found)
+    np.testing.assert_array_equal(again.eigenvalues, found.eigenvalues)
+    table = found.to_dataframe()
+    assert list(table)[:5] == ["U", "amplitude", "stable", "eigenvalue_real", "eigenvalue_imag"]
+    found.plot(tmp_path / "rest.png")
+
+
+def test_wrong_use_is_refused(wing):
+    with pytest.raises(so.InputError, match=r"make them zero \(here by F\)"):
+        so.equilibria(so.library.duffing(), "F", (0.0, 1.0))
+    with pytest.raises(so.InputError, match="depends on time"):
+        so.equilibria(so.library.mathieu_duffing(F=0.0), "eps", (0.0, 1.0))
+    with pytest.raises(so.InputError, match="they have no omega"):
+        so.equilibria(wing, "omega", (0.5, 1.0))
+    with pytest.raises(so.InputError, match="start must have 2 displacements"):
+        so.equilibria(wing, "U", (0.5, 1.0), start=[0.0])
+    with pytest.raises(so.InputError, match="highest must be a positive frequency"):
+        so.equilibria(wing, "U", (0.5, 1.0), highest=-1.0)
+    found = so.equilibria(wing, "U", (0.2, 2.5))
+    with pytest.raises(so.InputError, match="nothing moves there"):
+        so.limit_cycles(found.points[0], (0.2, 2.0), "U")
