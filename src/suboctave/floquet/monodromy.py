@@ -307,8 +307,8 @@ class _Linearised:
             elif weight < 1.0:
                 start = start - (1.0 - weight) * (projector(self.before) @ start)
             share = response(
-                self._structures, self._stretch, self._forms, self.active, self._acting, self._solved, self._states, start,
-                self._whole, self._kept, self.path, _LARGEST, change,
+                self._structures, self._stretch, self._forms, self.active, self._acting, self._solved, self._states,
+                start, self._whole, self._kept, self.path, _LARGEST, change,
             )  # fmt: skip
         law, kick = self._changed(change)
         after = self._march(law, kick, self.size)[self._kept]

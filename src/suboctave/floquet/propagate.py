@@ -265,8 +265,8 @@ def response(structures, stretch, forms, active, acting, solved, states, start, 
     kept states `start` (kept, 1); returns the share of it that is left: none is larger than `largest` times the
     displacement.
 
-    structures, stretch, forms, active, acting, solved, states: see `march`; whole (S, kept + 1): states at the end of the
-    period, kept (kept,): which of them these are; path (C, 2, N): the motion along all channels.
+    structures, stretch, forms, active, acting, solved, states: see `march`; whole (S, kept + 1): states at the end of
+    the period, kept (kept,): which of them these are; path (C, 2, N): the motion along all channels.
     """
     kinds, moved, reading, influence, entering = structures
     groups, m, free, size = active.shape[0], ORDER, start.shape[0], whole.shape[0]
