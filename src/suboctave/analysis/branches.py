@@ -15,7 +15,8 @@ import numpy as np
 
 from suboctave.analysis.options import CurveOptions, CurveRun, Inherited, check_inside, settings_of
 from suboctave.analysis.subharmonics import check_order, subharmonic_start
-from suboctave.bifurcation.bifurcation import Bifurcation
+from suboctave.analysis.switch_tracked import leaves_free_phase, switch_tracked
+from suboctave.bifurcation.bifurcation import Bifurcation, TrackedEvent
 from suboctave.bifurcation.bordered import at_values, branching_equation, null_vectors
 from suboctave.continuation import CurvePoint, NewtonOptions, SteppingOptions
 from suboctave.continuation.linear import length
@@ -246,6 +247,8 @@ def switch_branch(
 ) -> Branch:
     """The branch that leaves another one at a period doubling or a branch point, with stability and bifurcations.
 
+    From a curve of motions of a free phase (limit cycles, modes) a curve of such motions, a `TrackedBranch`.
+
     At a period doubling (PD) the motions of twice the period: there is one such branch, either sign of the null vector
     leads onto the same motions, a period of the parent apart. It is followed until it meets its parent again at a
     period doubling (`branch.arrives`), closes, or leaves the range. At a branch point (BP) the other branch, both ways.
@@ -283,6 +286,9 @@ def switch_branch(
             "branch is not known there"
         )
     orbit, name = bifurcation.orbit, bifurcation.parameter_name
+    if isinstance(bifurcation, TrackedEvent) and leaves_free_phase(bifurcation):
+        ends = None if bounds is None else check_bounds(orbit.system, name, bounds)
+        return switch_tracked(bifurcation, side, ends, harmonics, options)
     known = Inherited(bifurcation)
     ends = check_bounds(orbit.system, name, known.bounds(name) if bounds is None else bounds)
     check_inside(f"the {KINDS[kind].words}", name, bifurcation.parameter(name), ends)

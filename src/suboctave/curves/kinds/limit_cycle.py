@@ -51,7 +51,7 @@ class LimitCycle(Augmentation):
         """See `Augmentation.through`."""
         return cls.of(state), np.zeros(0)
 
-    def multiplier(self, rate: float, extra: Array) -> complex:
+    def multiplier(self, rate: float, extra: Array) -> complex | None:
         return 1.0 + 0.0j
 
     def at(self, state: BalanceState, extra: Array, names: tuple[str, ...]) -> CycleEquations:

@@ -28,7 +28,7 @@ from suboctave.curves.kinds.singular import SingularOperator
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.sample import Sample
 from suboctave.curves.trace import joined
-from suboctave.curves.tracked.tests import CurveTest, Cusp, Extremum
+from suboctave.curves.tracked.tests import CurvesCross, CurveTest, Cusp, Extremum
 from suboctave.errors import ConvergenceError
 from suboctave.floquet.methods import StabilityMethod
 from suboctave.harmonic.basis import HarmonicBasis
@@ -151,7 +151,7 @@ class LocatedEvent:
     """An event between two neighbours: its test, where it lies, and at an extremum which way the curve turns.
 
     `rough`: where more harmonics are to locate it better; `slope`: about the test's derivative by arclength; `off`: how
-    far it may still lie off, in scaled arclength, where nothing could locate it better.
+    far it may still lie off, in scaled arclength, where nothing could locate it better; `ends`: the two neighbours.
     """
 
     test: CurveTest
@@ -160,6 +160,17 @@ class LocatedEvent:
     rough: Bracket | None = None
     slope: float = 0.0
     off: float = 0.0
+    ends: tuple[Sample, Sample] | None = None
+
+    def chord(self) -> Array | None:
+        """The way between the neighbours, in the discretisation of the event: the direction of the curve where that of
+        its own equations is not unique.
+        """
+        if self.ends is None:
+            return None
+        curve, (a, b) = self.sample.curve, self.ends
+        way: Array = curve.transfer(b.point.u, b.curve) - curve.transfer(a.point.u, a.curve)
+        return way
 
 
 def events_between(
@@ -192,15 +203,19 @@ def located(test: CurveTest, low: Sample, high: Sample, newton: NewtonOptions) -
         # in this discretisation it lies before the first
         slope = (last - first) / way
         sample = zero_along(same.point, own.value, newton, way, slope)
-        return LocatedEvent(own, sample, own.extreme(-slope, sample), None, slope) if own.genuine(sample) else None
+        if not own.genuine(sample):
+            return None
+        return LocatedEvent(own, sample, own.extreme(-slope, sample), None, slope, ends=(same, high))
     bracket = Bracket(same.point, high.point, (first, last), lambda point: own.value(Sample(point)), newton)
-    share, little = bracket.zero(_ROUGH), _JUMP * min(abs(first), abs(last))
+    # whether curves cross is known at the crossing itself
+    precisely = isinstance(own, CurvesCross)
+    share, little = bracket.zero(_RESOLVED if precisely else _ROUGH), _JUMP * min(abs(first), abs(last))
     # on a curve of extrema those that others bring about are known by their distance; multipliers tell only close by
     apart = high.curve.augmentation.turning or type(own).genuine is not CurveTest.genuine or isinstance(own, Extremum)
     if not apart and abs(bracket.values[share]) > little:
         share = bracket.zero(_RESOLVED)
         if abs(bracket.values[share]) > little:
-            own.jumps()
+            # it changes sign without vanishing, as c3 does in a corner
             return None
     sample, value = Sample(bracket.points[share]), bracket.values[share]
     if not own.genuine(sample):
@@ -213,7 +228,9 @@ def located(test: CurveTest, low: Sample, high: Sample, newton: NewtonOptions) -
     # what more harmonics will move need not be known better
     finer = _finer(sample) is not None
     sample = sample if finer else Sample(bracket.points[bracket.zero(_RESOLVED)])
-    return LocatedEvent(own, sample, own.extreme(first or -slope, sample), bracket if finer else None, slope)
+    return LocatedEvent(
+        own, sample, own.extreme(first or -slope, sample), bracket if finer else None, slope, ends=(same, high)
+    )
 
 
 def _genuine(events: list[LocatedEvent], curve: MotionProblem, near: float) -> list[LocatedEvent]:
@@ -221,7 +238,7 @@ def _genuine(events: list[LocatedEvent], curve: MotionProblem, near: float) -> l
 
     Slopes jump at a corner, and may seem to turn to and fro in it. Along a curve of extrema the extreme parameter turns
     where the third one does: w . (Y_q dq + Y_r dr) = 0, w the left null vector of M. At a cusp a symmetry may have both
-    turn, which makes no extremum of either.
+    turn, which makes no extremum of either. Where a symmetry has curves cross, what is symmetric turns along one.
     """
 
     def beside(item: LocatedEvent, others: list[LocatedEvent]) -> bool:
@@ -229,6 +246,8 @@ def _genuine(events: list[LocatedEvent], curve: MotionProblem, near: float) -> l
 
     turns = {name: [i for i in events if isinstance(i.test, Extremum) and i.test.name == name] for name in curve.names}
     dropped = [item for own in turns.values() for item in own if beside(item, own)]
+    crossings = [item for item in events if isinstance(item.test, CurvesCross)]
+    dropped += [item for item in events if item.test.at_crossings and beside(item, crossings)]
     extreme, last = curve.augmentation.turning, curve.names[-1]
     if extreme:
         cusps = [item for item in events if isinstance(item.test, Cusp)]
@@ -284,7 +303,8 @@ def as_event(event: LocatedEvent, method: StabilityMethod, observe: int) -> Trac
     """An event as users get it; `observe`: the DOF whose amplitude is reported."""
     sample = event.sample
     curve, orbit = sample.curve, sample.orbit
-    name = getattr(event.test, "name", curve.names[1])
+    name = getattr(event.test, "name", curve.names[:2][-1])
+    chord = event.chord() if isinstance(event.test, CurvesCross) else None
     return TrackedEvent(
         event.test.kind,
         orbit,
@@ -297,6 +317,7 @@ def as_event(event: LocatedEvent, method: StabilityMethod, observe: int) -> Trac
         arclength=sample.point.arclength,
         # a parameter changes by no more than its range along a unit of arclength
         uncertainty=event.off * curve.spans[curve.names.index(name)],
+        tangent=None if chord is None else tuple(chord.tolist()),
         curve=curve.augmentation.name,
         names=curve.names,
         extreme=event.extreme,

@@ -28,14 +28,13 @@ from itertools import product
 import numpy as np
 
 from suboctave.bifurcation.bordered import NullVectors, bordered, null_vectors, transversality
-from suboctave.continuation.linear import Factor
 from suboctave.continuation.point import crossing_matrix
 from suboctave.curves.kinds.singular import SingularOperator
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.sample import Sample
 from suboctave.errors import ConvergenceError
 from suboctave.floquet.symmetric import UNDAMPED, symmetric_functions
-from suboctave.harmonic.basis import Array, ComplexArray
+from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.perturbation import Kind
 from suboctave.kinds import MOTION_KINDS
 
@@ -52,6 +51,10 @@ _CORRECTIONS, _KNOWN = 6, 1e-11
 #: distance of that kappa from the one of the multipliers, in the same units, at which it belongs to another pair, and
 #: of that pair's growth from that of the multipliers, as a share
 _STRAYED, _AGREES = 0.1, 0.25
+#: least singular value of a crossing matrix above which no curves cross
+_CROSSED = 1e-5
+#: logarithm of a determinant, in units of those at the ends of a step, up to which it counts
+_LARGE = 300.0
 #: logarithm of a pair's modulus up to which it may be on the unit circle
 _ON_IT = 0.03
 
@@ -60,6 +63,8 @@ class CurveTest(ABC):
     """One kind of event: a function of the curve's points that changes sign; `kind` is what the events are called."""
 
     kind: str
+    #: whether a crossing of curves that a symmetry brings about changes its sign as well
+    at_crossings: bool = False
 
     @abstractmethod
     def value(self, sample: Sample) -> float:
@@ -86,11 +91,6 @@ class CurveTest(ABC):
         """Whether what was located is an event."""
         return True
 
-    def jumps(self) -> None:  # noqa: B027 - harmless as a rule
-        """It changes sign without vanishing, as c3 does in a corner; raises ConvergenceError where that is no accident
-        of the test alone.
-        """
-
     def extreme(self, before: float, at: Sample) -> str:
         """Whether a parameter that turns has a maximum or a minimum, empty for other events; before: the sign before
         it.
@@ -108,6 +108,7 @@ class Extremum(CurveTest):
 
     name: str
     kind = "extremum"
+    at_crossings = True
 
     def value(self, sample: Sample) -> float:
         slope = sample.slopes[self.name]
@@ -145,31 +146,39 @@ class TurningPoint(Extremum):
 
 @dataclass(frozen=True)
 class CurvesCross(CurveTest):
-    """Another curve of the same equations crosses: the orientation changes. Between neighbours by the bordered scalar
-    of the equations with the tangent as their last row, all rows of unit length; `borders`: its null vectors.
+    """Another curve of the same equations crosses: the orientation changes. Between neighbours by the determinant of
+    the equations with the tangent as their last row, all rows of unit length; `unit`: the logarithm of its size there.
     """
 
     kind = "BP"
-    borders: tuple[Array, Array] | None = None
+    unit: float | None = None
 
     def value(self, sample: Sample) -> float:
-        if self.borders is None:
+        if self.unit is None:
             return sample.point.orientation
-        matrix, (left, right) = crossing_matrix(sample.point), self.borders
-        whole = Factor.of(np.block([[matrix, left[:, None]], [right[None], np.zeros((1, 1))]]))
-        return float(whole.solve(np.eye(1, len(matrix) + 1, len(matrix))[0])[-1]) * whole.sign
+        sign, size = self._determinant(sample)
+        return sign * math.exp(min(size - self.unit, _LARGE))
 
     def within(self, a: Sample, b: Sample) -> CurveTest:
-        u, _, vt = np.linalg.svd(crossing_matrix(b.point))
-        return replace(self, borders=(u[:, -1], vt[-1]))
+        return replace(self, unit=max(self._determinant(sample)[1] for sample in (a, b)))
+
+    @staticmethod
+    def _determinant(sample: Sample) -> tuple[float, float]:
+        """Sign and logarithm of that of the crossing matrix."""
+        sign, size = np.linalg.slogdet(crossing_matrix(sample.point))
+        return float(sign), float(size)
 
     def smooth(self, sample: Sample) -> tuple[float, float]:
         # what more harmonics do to a determinant is no matter of the motion; the parameter turns where it vanishes, too
         _, size = symmetric_functions(sample.others)[:, 0].tolist()
         return sample.point.orientation, size - _logarithm(sample.slopes[sample.curve.name])
 
-    def jumps(self) -> None:
-        raise ConvergenceError("the orientation changes, and no curves cross: the curve may have jumped to another")
+    def genuine(self, sample: Sample) -> bool:
+        """See `CurveTest.genuine`; raises ConvergenceError where no curves cross."""
+        least = float(np.linalg.svd(crossing_matrix(sample.point), compute_uv=False)[-1])
+        if least > _CROSSED:
+            raise ConvergenceError("the orientation changes, and no curves cross: the curve may have jumped to another")
+        return True
 
 
 @dataclass(frozen=True)
