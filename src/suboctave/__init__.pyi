@@ -10,6 +10,7 @@ from .analysis.diagram import bifurcation_diagram as bifurcation_diagram
 from .analysis.equilibria import equilibria as equilibria
 from .analysis.limit_cycles import limit_cycles as limit_cycles
 from .analysis.locate_extremum import locate_extremum as locate_extremum
+from .analysis.nonlinear_mode import nonlinear_mode as nonlinear_mode
 from .analysis.phase_resonance import phase_resonance as phase_resonance
 from .analysis.sensitivity import Sensitivity as Sensitivity, sensitivity as sensitivity
 from .analysis.subharmonics import (

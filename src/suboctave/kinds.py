@@ -84,6 +84,10 @@ KINDS: dict[str, Kind] = {
     "Hopf": Kind(
         "Hopf point", (5, 0, 180), "#009E73", 0.92, critical=2, equations="singular:SingularOperator", line="#009E73"
     ),
+    "nonlinear_mode": Kind(
+        "nonlinear mode", (7, 1, 0), "#56B4E9", multiplier=1.0, critical=2, equations="nonlinear_mode:NonlinearMode",
+        choices={}, line="#D55E00", free_phase=True,
+    ),
     "extremum": Kind("extremum of a parameter along a curve of bifurcations", "d", _WHITE, 0.9, "extremum"),
     "CP": Kind("cusp", "P", "#0072B2", 1.1),
     "GPD": Kind("generalised period doubling", "h", "#E69F00", 1.12),

@@ -34,6 +34,7 @@ from suboctave.harmonic.truncation import AdaptiveHarmonics
 from suboctave.kinds import KINDS, MOTION_KINDS
 from suboctave.progress import reporting
 from suboctave.results.branch import TrackedBranch
+from suboctave.results.modes import tracked_class
 
 Range = tuple[float, float]
 
@@ -123,11 +124,12 @@ def switch_tracked(
         check_unknowns(orbit.balance.size, leaving.curve.balance.basis)
         half = item.kind == "PD" or side is not None
         trace = leaving.half(float(side or 1)) if half else leaving.whole()
-    kept = {**options_of(settings, wanted, given), "onto": known.known.get("onto")}
+    own = {name: known.known[name] for name in ("onto", "damped", "mode") if name in known.known}
+    kept = {**options_of(settings, wanted, given), **own}
     context = {"system": orbit.system, "parameter": name, **kept}
     met = [replace(event, context=context) for event in trace.bifurcations]
     departs = None if trace.departs is None else Junction.of(trace.departs)
-    return TrackedBranch(
+    return tracked_class(item.curve)(
         item.curve, item.names, orbit.system, name, trace.points, met, [], trace.closed, trace.endings,
         settings.observe, kept, tuple(trace.warnings), departs=departs,
     )  # fmt: skip

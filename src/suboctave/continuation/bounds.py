@@ -1,14 +1,17 @@
-"""Where a curve leaves the range of one of its parameters: within a step, or by passing a bound and coming back."""
+"""Where a curve leaves the range of one of its parameters, or of what is measured at its points: within a step, or by
+passing a bound and coming back.
+"""
 
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 
 from suboctave.continuation.linear import distance
 from suboctave.continuation.newton import NewtonOptions, correct
-from suboctave.continuation.point import CurvePoint, between, make_point
+from suboctave.continuation.point import CurvePoint, between, make_point, point_between
 from suboctave.continuation.problem import Curve
 from suboctave.errors import ConvergenceError
 
@@ -16,19 +19,20 @@ from suboctave.errors import ConvergenceError
 _HALVED = 20
 #: way beyond a bound, as a share of the range, that a turn on it may lie by rounding
 _ON_IT = 1e-9
+#: points solved for between two neighbours until a measure is that of a bound, and the share of the bound it may be off
+_SOLVED, _SAME = 60, 1e-13
 
 
 @dataclass(frozen=True)
-class Bounds:
-    """The range (low, high) of a parameter; `index`: that of the parameter among the unknowns of a curve."""
+class Range(ABC):
+    """From `low` to `high`."""
 
-    index: Callable[[Curve], int]
     low: float
     high: float
 
+    @abstractmethod
     def value(self, point: CurvePoint) -> float:
-        """The parameter at a point."""
-        return float(point.u[self.index(point.curve)])
+        """What is bounded, at a point."""
 
     def passed(self, a: CurvePoint, b: CurvePoint) -> float | None:
         """The bound on or beyond which the second of two neighbours lies and the first does not, or None."""
@@ -39,10 +43,57 @@ class Bounds:
             return self.low
         return None
 
+    @abstractmethod
     def left(self, a: CurvePoint, b: CurvePoint, newton: NewtonOptions) -> CurvePoint | None:
         """The point on a bound at which a curve leaves the range between two neighbours, None if it stays inside;
         ConvergenceError where it leaves and no solution is found exactly on the bound.
         """
+
+
+@dataclass(frozen=True)
+class Measured(Range):
+    """The range of what `measure` tells of a point, which is no unknown of the curve."""
+
+    measure: Callable[[CurvePoint], float]
+
+    def value(self, point: CurvePoint) -> float:
+        """What is measured at a point."""
+        return self.measure(point)
+
+    def left(self, a: CurvePoint, b: CurvePoint, newton: NewtonOptions) -> CurvePoint | None:
+        """See `Range.left`; a measure that comes back within a step is not noticed."""
+        bound = self.passed(a, b)
+        if bound is None:
+            return None
+        ends, misses = [0.0, 1.0], [self.value(a) - bound, self.value(b) - bound]
+        point, kept = b, -1
+        for _ in range(_SOLVED):
+            share = (ends[0] * misses[1] - ends[1] * misses[0]) / (misses[1] - misses[0])
+            point = point_between(a, b, share, newton)
+            miss = self.value(point) - bound
+            if abs(miss) <= _SAME * abs(bound) or not ends[0] < share < ends[1]:
+                break
+            # the end that stays has its miss halved (the Illinois method)
+            moved = 0 if miss * misses[0] > 0.0 else 1
+            ends[moved], misses[moved] = share, miss
+            if kept == moved:
+                misses[1 - moved] *= 0.5
+            kept = moved
+        return point
+
+
+@dataclass(frozen=True)
+class Bounds(Range):
+    """The range (low, high) of a parameter; `index`: that of the parameter among the unknowns of a curve."""
+
+    index: Callable[[Curve], int]
+
+    def value(self, point: CurvePoint) -> float:
+        """The parameter at a point."""
+        return float(point.u[self.index(point.curve)])
+
+    def left(self, a: CurvePoint, b: CurvePoint, newton: NewtonOptions) -> CurvePoint | None:
+        """See `Range.left`."""
         bound = self.passed(a, b)
         if bound is None:
             return self._turned_beyond(a, b, newton)

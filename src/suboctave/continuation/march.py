@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from suboctave.compiled import kernel
-from suboctave.continuation.bounds import Bounds
+from suboctave.continuation.bounds import Bounds, Range
 from suboctave.continuation.ending import Ending, EndReason
 from suboctave.continuation.linear import cosine, distance, length
 from suboctave.continuation.newton import NewtonOptions, Solved, closely, correct
@@ -151,7 +151,7 @@ class March:
     home
         A point already passed, in the direction of its tangent, at which the curve is closed; default: the start.
     others
-        Ranges of other unknowns, on which the curve ends as well.
+        Ranges of other unknowns, or of what is measured, on which the curve ends as well.
     """
 
     start: CurvePoint
@@ -162,7 +162,7 @@ class March:
     inspect: Callable[[CurvePoint, CurvePoint], bool] | None = None
     arrive: Callable[[CurvePoint, CurvePoint], Arrival | None] | None = None
     home: CurvePoint | None = None
-    others: Sequence[Bounds] = ()
+    others: Sequence[Range] = ()
     closed: bool = field(default=False, init=False)
     ending: Ending = field(default=Ending(EndReason.NOT_STARTED), init=False)
 
@@ -177,7 +177,7 @@ class March:
         point = self.start
         if point.tangent[point.curve.parameter] * self.direction < 0.0:
             point = point.turned
-        ranges = (Bounds(lambda curve: curve.parameter, *self.bounds), *self.others)
+        ranges = (Bounds(*self.bounds, lambda curve: curve.parameter), *self.others)
         home = Place(self.home or point)
         mark, marked = home, 0
         yield point

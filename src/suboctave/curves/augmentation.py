@@ -1,7 +1,7 @@
 """What singles a motion out among those of a system: scalar equations beside R = 0, and the unknowns they bring.
 
-An augmentation has one equation more than extra unknowns, so that two free parameters leave a curve; the empty one
-leaves the responses, along a single free parameter. Each kind of curve is a file in `kinds`.
+An augmentation has one equation more than extra unknowns, so that two free parameters leave a curve; as many leave one
+along a single free parameter: the empty one the responses. Each kind of curve is a file in `kinds`.
 
 Bordering vectors are frozen within Newton's method, which then solves fixed smooth equations, and renewed at every
 accepted point, from where they are the null vectors themselves.
@@ -73,6 +73,8 @@ class Augmentation(ABC):
 
     #: the parameter that has an extremum along curves of these bifurcations (`extremum`), empty where none need have
     turning: str = ""
+    #: whether free parameters count in units of their own values, not of their ranges
+    relative: bool = False
 
     @property
     @abstractmethod
@@ -88,6 +90,11 @@ class Augmentation(ABC):
     def free_phase(self) -> bool:
         """Whether a motion shifted in time is another solution: no load sets its phase, and omega is unknown."""
         return False
+
+    @property
+    def no_multipliers(self) -> str:
+        """Why the multipliers of its motions mean nothing, empty where they do."""
+        return ""
 
     @property
     def own(self) -> Augmentation:

@@ -56,7 +56,9 @@ class MotionEvaluation:
     @lazy
     def floquet(self) -> FloquetResult:
         """Multipliers of the motion, by the monodromy matrix."""
-        return floquet_multipliers(self.state)
+        why = self.curve.augmentation.no_multipliers
+        count = 2 * len(self.state.linear.equation_of_motion()[0]) if why else 0
+        return FloquetResult.inapplicable(count, "none", why) if why else floquet_multipliers(self.state)
 
     @property
     def known_floquet(self) -> FloquetResult | None:
@@ -258,7 +260,7 @@ class MotionProblem:
         if self.augmentation.extras:
             weights[n : -len(self.names)] = 1.0 / self.augmentation.spans(self.split(u)[1] / self.balance.basis.nu)
         for i, span in enumerate(self.spans, len(u) - len(self.names)):
-            weights[i] = 1.0 / span
+            weights[i] = 1.0 / (abs(u[i]) if self.augmentation.relative else span)
         return weights
 
     def unit(self, weights: Array) -> float:

@@ -243,9 +243,26 @@ class System:
             return self
         mass, _, stiffness = self.matrices()
         more = viscous_damping(mass, stiffness, self.structural.value(self.parameters))
-        result = self._changed(damping=self.damping.plus(more), structural=self.mass.zeros("structural"))
-        used = {name for _, source, _ in result.expressions() for name in source.names}
-        return result._changed(parameters={name: v for name, v in self.parameters.items() if name in used})
+        return self._changed(damping=self.damping.plus(more), structural=self.mass.zeros("structural"))._pruned()
+
+    def without_excitation(self) -> System:
+        """The same system under its constant loads alone, without the parameters that nothing else depends on."""
+        constant = [
+            HarmonicLoad(amplitude=c.amplitude.text, harmonic=0, phase=c.phase.text, direction=c.direction)
+            for c in self._components
+            if c.harmonic == 0
+        ]
+        return self._changed(loads=tuple(constant))._pruned()
+
+    def undamped(self) -> System:
+        """The same system without its damping matrices; elements stay as they are."""
+        zeros = {name: self.mass.zeros(name) for name in ("damping", "structural")}
+        return self._changed(**zeros)._pruned()
+
+    def _pruned(self) -> System:
+        """The same without parameters that nothing depends on."""
+        used = {name for _, source, _ in self.expressions() for name in source.names}
+        return self._changed(parameters={name: v for name, v in self.parameters.items() if name in used})
 
     def matrices(self, values: Mapping[str, float] | None = None) -> tuple[Array, Array, Array]:
         """`(M, C, K)` as dense arrays (n, n), at `values` (all parameters; default: the system's own)."""

@@ -35,6 +35,7 @@ from suboctave.model.system import System, build, describe
 from suboctave.results.branch import Branch, TrackedBranch
 from suboctave.results.diagram import BifurcationDiagram, DiagramBranch
 from suboctave.results.equilibria import Equilibria
+from suboctave.results.modes import tracked_class
 from suboctave.store.layout import branch_dataset, events_met
 from suboctave.store.plain import array_of, from_json, padded, recorded, system_arrays
 from suboctave.store.registry import Codec, parts_of, register
@@ -242,7 +243,7 @@ class _Reader:
         given |= {"bifurcations": bifurcations, "events": own}
         if tracked := record.get("tracked"):
             kind, names, turning = tracked["kind"], tracked["names"], tracked.get("turning", "")
-            branch: Branch = TrackedBranch(kind, names, turning=turning, **given)
+            branch: Branch = tracked_class(kind)(kind, names, turning=turning, **given)
         else:
             branch = (Equilibria if "still" in given["options"] else Branch)(**given)
         branch.seconds = record["seconds"]

@@ -33,6 +33,7 @@ from numpy.typing import ArrayLike
 from suboctave.bifurcation.gaps import contact_side, levels
 from suboctave.errors import InputError, shortened, suggest
 from suboctave.harmonic.basis import Array, ComplexArray, harmonic_index, to_complex
+from suboctave.harmonic.energy import action, damping_ratio, mean_energy, modal_amplitude
 from suboctave.harmonic.orbit import PeriodicOrbit, force_along
 from suboctave.harmonic.quadrature import search_grid
 from suboctave.harmonic.trigonometric import crossings, extrema, peak
@@ -227,6 +228,10 @@ _READ: Mapping[str, Callable[[PeriodicOrbit, int, float], Any]] = {
     "impacts": lambda orbit, _, index: contact_of(orbit, int(index))[1],
     "transmitted_force": lambda orbit, _dof, _: largest(ground_and_load(orbit, np.ones(orbit.balance.system.n))[0]),
     "transmissibility": lambda orbit, _dof, _: _force_ratio(orbit, 1, np.ones(orbit.balance.system.n)),
+    "energy": lambda orbit, _dof, _: mean_energy(orbit.state()),
+    "action": lambda orbit, _dof, _: action(orbit.state()),
+    "modal_amplitude": lambda orbit, _dof, _: modal_amplitude(orbit.state()),
+    "damping_ratio": lambda orbit, _dof, _: damping_ratio(orbit.state()),
 }
 _OF_A_DOF = ("rms", "velocity", "velocity_rms", "acceleration", "acceleration_rms")
 _OF_A_GAP = ("contact_share", "impacts")

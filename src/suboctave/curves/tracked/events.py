@@ -308,7 +308,7 @@ def as_event(event: LocatedEvent, method: StabilityMethod, observe: int) -> Trac
     return TrackedEvent(
         event.test.kind,
         orbit,
-        method.along(sample.state),
+        sample.evaluation.floquet if curve.augmentation.no_multipliers else method.along(sample.state),
         orbit.residual,
         orbit.amplitude(observe),
         name,

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
 from suboctave.continuation import CurvePoint, March
-from suboctave.continuation.bounds import Bounds
 from suboctave.continuation.ending import Ending, EndReason
 from suboctave.continuation.linear import cosine, length
 from suboctave.continuation.point import solved_again
 from suboctave.curves.follow import Driver
 from suboctave.curves.junction import keeps_subharmonics
+from suboctave.curves.measures import bounded
 from suboctave.curves.motion import CRITICAL_EVERY, MotionProblem
 from suboctave.curves.sample import Sample
 from suboctave.curves.trace import Settings, Trace, TrackedPoint
@@ -34,6 +33,8 @@ from suboctave.curves.tracked.start import Ranges
 from suboctave.curves.tracked.tests import Extremum, tests_of
 from suboctave.errors import ConvergenceError
 
+#: range of a parameter that is not bounded
+_ANY = (-math.inf, math.inf)
 #: steps longer than this, in scaled arclength, must not change the curve's orientation
 _JUMP = 2e-6
 #: growth of motions from that at the start after which they may grow for ever
@@ -61,10 +62,10 @@ class _Tracker(Driver):
         self.lopsided = is_lopsided(Sample(start))
         #: the first point, headed as the curve leaves it
         self.home: CurvePoint | None = None
-        self.bounds = ranges[start.curve.name]
-        #: ranges of the parameters but the last
+        self.bounds = ranges.get(start.curve.name, _ANY)
+        #: ranges of the parameters but the last, and of what is measured
         self.others = [
-            Bounds(partial(MotionProblem.index, name=name), *ends)
+            bounded(start.curve, name, ends, settings.observe)
             for name, ends in ranges.items()
             if name != start.curve.name
         ]
@@ -217,7 +218,8 @@ class _Tracker(Driver):
 
     def _add(self, sample: Sample) -> None:
         method, point = self.settings.stability, sample.point
-        known = sample.evaluation.known_floquet if method.follows_monodromy else None
+        follows, none = method.follows_monodromy, sample.curve.augmentation.no_multipliers
+        known = sample.evaluation.floquet if none else sample.evaluation.known_floquet if follows else None
         extra = sample.instant_or_frequency, sample.coefficient, sample.extreme, sample.isola
         self.trace.points.append(TrackedPoint(sample.orbit, known, point.arclength, point.iterations, method, *extra))
 

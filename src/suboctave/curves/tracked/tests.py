@@ -10,8 +10,8 @@
                       curves, as of NS points along a branch: a complex pair passes it
     NSNS              the same on NS curves
     LP, BP, PD, NS    the same on curves of motions that need no critical multiplier (`MOTION_KINDS`)
-    LP, BP            of motions of a free phase, where J_0 is singular all along: the last parameter turns; the
-                      orientation of the curve changes
+    LP, BP            of motions of a free phase, where J_0 is singular all along: the last parameter turns, of
+                      conservative modes the action; the orientation of the curve changes
 
 The multiplier or the pair that is critical all along the curve is not counted. Two real multipliers whose product
 passes one (a neutral saddle) stay where they are. (Kuznetsov, Elements of Applied Bifurcation Theory, 3rd ed., chapters
@@ -29,12 +29,14 @@ import numpy as np
 
 from suboctave.bifurcation.bordered import NullVectors, bordered, null_vectors, transversality
 from suboctave.continuation.point import crossing_matrix
+from suboctave.curves.kinds.nonlinear_mode import NonlinearMode
 from suboctave.curves.kinds.singular import SingularOperator
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.sample import Sample
 from suboctave.errors import ConvergenceError
 from suboctave.floquet.symmetric import UNDAMPED, symmetric_functions
 from suboctave.harmonic.basis import ComplexArray
+from suboctave.harmonic.energy import action_along
 from suboctave.harmonic.perturbation import Kind
 from suboctave.kinds import MOTION_KINDS
 
@@ -145,6 +147,20 @@ class TurningPoint(Extremum):
 
 
 @dataclass(frozen=True)
+class ActionTurns(CurveTest):
+    """The limit point of conservative modes: action and energy turn, `dE = omega dJ`, and beside the two multipliers
+    that are +1 by themselves two more are. Where omega turns instead there are none.
+    """
+
+    kind = "LP"
+    at_crossings = True
+
+    def value(self, sample: Sample) -> float:
+        point, n = sample.point, sample.curve.balance.dimension
+        return action_along(sample.state, point.tangent[:n], float(point.tangent[-1]))
+
+
+@dataclass(frozen=True)
 class CurvesCross(CurveTest):
     """Another curve of the same equations crosses: the orientation changes. Between neighbours by the determinant of
     the equations with the tangent as their last row, all rows of unit length; `unit`: the logarithm of its size there.
@@ -169,6 +185,8 @@ class CurvesCross(CurveTest):
         return float(sign), float(size)
 
     def smooth(self, sample: Sample) -> tuple[float, float]:
+        if isinstance(sample.curve.augmentation, NonlinearMode):
+            return self._determinant(sample)
         # what more harmonics do to a determinant is no matter of the motion; the parameter turns where it vanishes, too
         _, size = symmetric_functions(sample.others)[:, 0].tolist()
         return sample.point.orientation, size - _logarithm(sample.slopes[sample.curve.name])
@@ -429,6 +447,8 @@ def tests_of(curve: MotionProblem) -> tuple[CurveTest, ...]:
     if own.free_phase:
         if curve.augmentation.turning or own.name not in MOTION_KINDS:
             return turns
+        if isinstance(own, NonlinearMode):
+            return (*turns, CurvesCross(), *((ActionTurns(), _CROSSINGS[0]) if own.conservative else ()))
         return (*turns[:-1], TurningPoint(curve.name), CurvesCross(), *_CROSSINGS)
     if own.name in MOTION_KINDS:
         return (*turns, *_OF_MOTIONS)

@@ -1,0 +1,309 @@
+"""Nonlinear modes: from a linear mode at rest towards larger amplitudes (`curves.kinds.nonlinear_mode`)."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Unpack
+
+import numpy as np
+
+from suboctave.analysis.options import TrackOptions, options_of, settings_of
+from suboctave.bifurcation.gaps import rests_in_corner
+from suboctave.continuation import CurvePoint, March
+from suboctave.continuation.linear import length, one_thread
+from suboctave.curves.kinds.nonlinear_mode import NonlinearMode
+from suboctave.curves.measures import MEASURES, bounded
+from suboctave.curves.motion import MotionProblem
+from suboctave.curves.starts import Harmonics, make_curve, settled
+from suboctave.curves.trace import Settings
+from suboctave.curves.tracked.follow import follow_tracked
+from suboctave.errors import ConvergenceError, InputError, is_number, shortened
+from suboctave.harmonic.assembly import apply_blocks
+from suboctave.harmonic.basis import Array, ComplexArray
+from suboctave.harmonic.energy import at_rest, damping_ratio, feeding
+from suboctave.harmonic.evaluation import BalanceState
+from suboctave.harmonic.linear_modes import linear_modes
+from suboctave.model.inputs import check_count, check_is_system, check_range, timed
+from suboctave.model.system import System
+from suboctave.options import with_options
+from suboctave.progress import reporting
+from suboctave.results.modes import ModeCurve
+
+#: share by which forces deviate from linear ones where a mode begins
+_LINEAR = 1e-4
+#: share of the largest amplitude at which a mode begins that is linear
+_FIRST = 1e-3
+#: sizes of motions of unit modal mass at which forces are compared with linear ones
+_SIZES = np.geomspace(1e-12, 1e12, 289)
+#: share of a bound by which a start may miss it
+_ON_IT = 1e-9
+#: how often an interval of sizes, in powers, is halved
+_HALVED = 60
+#: how often a structure is projected for higher frequencies until it has the mode, and by how much higher
+_TRIES, _HIGHER = 30, 4.0
+#: damping ratio of a conservative mode beyond which its laws are not conservative
+_CONSERVATIVE = 1e-6
+#: share of a matrix that is rounding
+_ROUNDING = 1e-12
+
+Range = tuple[float, float]
+
+
+@with_options(TrackOptions)
+@timed
+def nonlinear_mode(
+    system: System,
+    mode: int = 1,
+    *,
+    amplitude: float | Range | None = None,
+    energy: float | Range | None = None,
+    omega: Range | None = None,
+    damped: bool | None = None,
+    harmonics: Harmonics = "adaptive",
+    **options: Unpack[TrackOptions],
+) -> ModeCurve:
+    """A nonlinear mode: motions that no load keeps going, from a linear mode towards larger amplitudes.
+
+    Of the conservative system over its energy, with the branch points from which internal resonances leave; of the
+    damped one with its damping ratio (extended periodic motion concept: Krack, Computers & Structures 154, 2015).
+    Oscillating loads are left out, constant ones stay.
+
+    Parameters
+    ----------
+    mode
+        The linear mode that it begins with, 1 the lowest of those that oscillate about the position of rest.
+    amplitude, energy, omega
+        Where it ends: the largest |x| of the observed DOF or the mean energy, up to a value or from one to another; the
+        frequency's range, rad per unit time. By default it begins where forces are linear but
+        for 1e-4, a linear mode at a thousandth of its last amplitude.
+    damped
+        Whether velocity-dependent forces count; False leaves damping matrices out. Default: whether there are any.
+    harmonics
+        As in `frequency_response`.
+
+    The formulation of bifurcations does not matter here.
+
+    Raises
+    ------
+    InputError
+        Wrong input, before any work: also laws that depend on velocity in the conservative form, or on time.
+    ConvergenceError
+        If the mode does not reach where it is to begin.
+    """
+    check_is_system(system)
+    number = check_count("mode", mode)
+    ranges = _ranges(amplitude, energy, omega)
+    free, with_damping = _free_system(system, damped)
+    observe = options.get("observe")
+    settings = settings_of(free, {**options, "observe": system.observed_dof if observe is None else observe})
+    with one_thread(), reporting(options.get("progress"), f"nonlinear mode {number}") as report:
+        linear = _linear_mode(free, number, ranges.get("omega"), harmonics, settings)
+        span = ranges.get("omega", (0.5 * linear.omega, 2.0 * linear.omega))
+        settings = settings.reporting_to(report, span, "event")
+        start = _started(linear, not with_damping, ranges, settings)
+        trace = follow_tracked(start, ranges, settings)
+    kept = {**options_of(settings, harmonics, ranges), "damped": with_damping, "mode": number}
+    context = {"system": free, "parameter": "omega", **kept}
+    met = [replace(event, context=context) for event in trace.bifurcations]
+    curve = ModeCurve(
+        NonlinearMode.name, ("omega",), free, "omega", trace.points, met, [], trace.closed, trace.endings,
+        settings.observe, kept, tuple(trace.warnings),
+    )  # fmt: skip
+    if (note := _work_of_laws(curve)) is not None:
+        curve.warnings += (note,)
+    return curve
+
+
+def _ranges(amplitude: Any, energy: Any, omega: Any) -> dict[str, Range]:
+    """The ranges that are given, by what they bound."""
+    ranges: dict[str, Range] = {}
+    for name, given in (("amplitude", amplitude), ("energy", energy)):
+        if given is None:
+            continue
+        first, last = (0.0, given) if is_number(given) else check_range(name, given)
+        if not 0.0 <= first < last < math.inf:
+            raise InputError(f"{name} runs from a smaller to a larger value, not {shortened(given)}")
+        ranges[name] = float(first), float(last)
+    if omega is not None:
+        first, last = check_range("omega", omega, positive=True)
+        ranges["omega"] = min(first, last), max(first, last)
+    if amplitude is not None and energy is not None:
+        raise InputError("the mode ends at an amplitude or at an energy: give one of them")
+    if not ranges:
+        raise InputError("where does the mode end? Give amplitude=, energy= or omega=")
+    return ranges
+
+
+def _free_system(system: System, damped: Any) -> tuple[System, bool]:
+    """The system whose mode is meant, and whether it is a damped one."""
+    if damped not in (None, True, False):
+        raise InputError(f"damped must be True, False or None, not {shortened(damped)}")
+    if system.excited_by_elements:
+        raise InputError("an element depends on time: such a system has no modes")
+    free = system.without_excitation()
+    moving = [element.label for element in free.elements if element.depends_on_velocity]
+    gyroscopic, damping = _damping(free)
+    _, _, stiffness = free.matrices()
+    skew = float(np.abs(stiffness - stiffness.T).max()) > _ROUNDING * float(np.abs(stiffness).max())
+    with_damping = damped if damped is not None else bool(moving or damping or skew)
+    if with_damping:
+        return free, True
+    refusals = [f"{', '.join(moving)} depend on velocity"] if moving else []
+    refusals += ["damping and gyroscopic coupling are in one matrix"] if damping and gyroscopic else []
+    refusals += ["the stiffness matrix is not symmetric"] if skew else []
+    if refusals:
+        raise InputError(
+            f"the conservative form of a mode is that of forces that have a potential, but {'; '.join(refusals)}: "
+            "leave damped= out for the damped one, or take these out of the system"
+        )
+    return (free.undamped() if damping else free), False
+
+
+def _damping(system: System) -> tuple[bool, bool]:
+    """Whether the damping matrix has a gyroscopic part, and whether there is damping in matrices."""
+    _, damping, _ = system.matrices()
+    least = _ROUNDING * float(np.abs(damping).max())
+    skew, own = (float(np.abs(damping + side * damping.T).max()) > least for side in (-1.0, 1.0))
+    return skew, own or not system.structural.zero
+
+
+@dataclass(frozen=True, eq=False)
+class _LinearMode:
+    """A linear mode on the curve of a nonlinear one: its frequency, shape in the unknowns, and the position of rest."""
+
+    curve: MotionProblem
+    omega: float
+    shape: ComplexArray
+    rest: Array
+
+    def motion(self, size: float) -> Array:
+        """Coefficients at a size of the motion, that of unit modal mass being 1."""
+        x = np.zeros((self.curve.balance.basis.size, len(self.rest)))
+        x[0], x[1], x[2] = self.rest, size * self.shape.real, -size * self.shape.imag
+        return x
+
+    def state(self, size: float) -> BalanceState:
+        """The same with all that follows of it."""
+        return self.curve.balance.at(self.motion(size), self.omega)
+
+    def point(self, size: float, conservative: bool, settings: Settings) -> CurvePoint:
+        """The point of the nonlinear mode of about that size, headed to larger ones."""
+        state = self.state(size)
+        curve = replace(self.curve, augmentation=NonlinearMode(state.x, state.basis, conservative))
+        curve.force = max(state.balanced.scale, curve.least_force(state))
+        u = curve.join(state.x, self.omega, np.array([damping_ratio(state)]))
+
+        def held(curve: MotionProblem, u: Array, weights: Array) -> Array:
+            row = np.zeros(len(u))
+            moving = slice(curve.balance.size, curve.balance.dimension)
+            row[moving] = (weights * u)[moving]
+            return row / length(row)
+
+        return settled(curve, u, settings.newton, held=held)
+
+    def linear_up_to(self) -> float:
+        """The largest size at which forces are linear but for a small share, infinite where they are at all sizes."""
+        rest, one = self.state(0.0), self.state(1.0)
+        change = (one.x - rest.x).ravel()
+        slope = rest.force_jacobian @ change
+        # of the forces of inertia, omega^2 M x
+        allowed = 0.5 * _LINEAR * length(apply_blocks(feeding(one), one.x - rest.x))
+        for before, size in zip((0.0, *_SIZES), _SIZES, strict=False):
+            bent = self.state(float(size)).force - rest.force
+            if not np.isfinite(bent).all() or length(bent.ravel() / size - slope) > allowed:
+                return float(before)
+        return math.inf
+
+
+def _linear_mode(
+    system: System, number: int, omega: Range | None, harmonics: Harmonics, settings: Settings
+) -> _LinearMode:
+    """A linear mode of a system, its linear part made to serve at its frequency."""
+    mass, _, stiffness = (np.diag(matrix) for matrix in system.matrices())
+    squares = stiffness / np.where(mass == 0.0, np.inf, mass)
+    served = max(omega) if omega else math.sqrt(min(squares[squares > 0.0], default=1.0))
+    found = np.zeros(0)
+    for _ in range(_TRIES):
+        curve = make_curve(system, "omega", served, 0.0, harmonics, 1, None, settings.observe)
+        rest = at_rest(curve.balance, served, curve.balance.values)
+        if rests_in_corner(rest) and not rest.x.any():
+            raise InputError("a law has a corner at rest: there are no linear modes to begin with")
+        found, shapes = linear_modes(rest)
+        if number <= len(found) and found[number - 1] <= served:
+            own = float(found[number - 1])
+            span = own if omega is None else max(omega) - min(omega)
+            return _LinearMode(replace(curve, spans=(span,)), own, shapes[number - 1], rest.x[0])
+        served *= _HIGHER
+    raise InputError(f"the system has {len(found)} modes that oscillate about its position of rest, no mode {number}")
+
+
+def _started(linear: _LinearMode, conservative: bool, ranges: Mapping[str, Range], settings: Settings) -> CurvePoint:
+    """The first point: at the lower bound, reached from where forces are linear."""
+    if "omega" in ranges:
+        low, high = ranges["omega"]
+        if not low <= linear.omega <= high:
+            raise InputError(f"the linear mode has omega = {linear.omega:.6g}, outside of ({low:g}, {high:g})")
+    limit = linear.linear_up_to()
+    if limit == 0.0:
+        raise InputError("forces are nowhere linear about rest: there are no linear modes to begin with")
+    measure = next((name for name in ranges if name in MEASURES), None)
+    first = last = math.inf
+    if measure is not None:
+        first, last = (_size_at(linear, measure, value, settings.observe) for value in ranges[measure])
+        if not last > 0.0:
+            raise InputError(
+                f"the {measure} at rest is larger already, or the observed DOF rests in this mode: observe="
+            )
+    size = first if 0.0 < first < math.inf else min(limit, _FIRST * last)
+    if not math.isfinite(size):
+        raise InputError("this mode is linear: give amplitude= or energy=, where it ends")
+    point = linear.point(min(size, limit), conservative, settings)
+    if measure is None or not 0.0 < first < math.inf:
+        return point
+    return _moved(point, measure, ranges, settings)
+
+
+def _size_at(linear: _LinearMode, name: str, value: float, observe: int) -> float:
+    """About the size of a linear motion at which a measure has a value, 0 where it is larger at once."""
+    low, high = (math.log(size) for size in (_SIZES[0], _SIZES[-1]))
+    if not value > 0.0:
+        return 0.0
+    with np.errstate(over="ignore", invalid="ignore"):
+        for _ in range(_HALVED):
+            middle = 0.5 * (low + high)
+            beyond = not MEASURES[name](linear.state(math.exp(middle)), observe) <= value
+            low, high = (low, middle) if beyond else (middle, high)
+    return math.exp(low) if low > math.log(_SIZES[0]) else 0.0
+
+
+def _moved(point: CurvePoint, measure: str, ranges: Mapping[str, Range], settings: Settings) -> CurvePoint:
+    """The point of a mode at the lower bound of what is measured, from one beside or below it."""
+    first = ranges[measure][0]
+    value = bounded(point.curve, measure, ranges[measure], settings.observe).value(point)
+    if abs(value - first) <= _ON_IT * first:
+        return point
+    if value > first:
+        point = point.turned
+    ends = (-math.inf, first) if value < first else (first, math.inf)
+    others = [bounded(point.curve, measure, ends, settings.observe)]
+    omega = ranges.get("omega", (0.0, math.inf))
+    march = March(point, 0.0, omega, settings.newton, settings.stepping, others=others)
+    # the last of its points alone is kept
+    (found,) = deque(march, maxlen=1)
+    if abs(others[0].value(found) - first) > _ON_IT * first:
+        raise ConvergenceError(f"the mode does not reach {measure} = {first:g}, where it is to begin: {march.ended}")
+    return replace(found if value < first else found.turned, arclength=0.0)
+
+
+def _work_of_laws(curve: ModeCurve) -> str | None:
+    """What to say where forces of a conservative mode do work over a period."""
+    ratios = np.abs(curve.damping_ratio)
+    if curve.damped or ratios.max(initial=0.0) <= _CONSERVATIVE:
+        return None
+    return (
+        f"the forces do work over a period, as much as a damping ratio of up to {ratios.max():.1e}: they have no "
+        "potential, and the motions are those that this damping would have"
+    )

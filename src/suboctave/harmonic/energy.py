@@ -1,0 +1,135 @@
+"""Energy of a motion, action, and the position of rest that energies are measured from.
+
+    E = x' . M x' / 2 + (x . K x - r . K r) / 2 + int f . dx - p . (x - r),
+
+the work of the element forces f taken along the straight way from rest r to x, where velocities are zero, p the
+constant loads. It is constant along a motion of a conservative system; else its mean over a period is meant. With J the
+action, `omega J` twice the mean kinetic energy, `dE = omega dJ` along a family of conservative motions.
+
+M is taken from the dynamic stiffness, `-Re dA/dOmega / (2 Omega)`, so that condensed structures have their whole mass.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from functools import lru_cache
+
+import numpy as np
+
+from suboctave.errors import ConvergenceError
+from suboctave.harmonic.aft.law import Member
+from suboctave.harmonic.assembly import apply_blocks
+from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis, to_complex
+from suboctave.harmonic.evaluation import BalanceState, HarmonicBalance, length
+from suboctave.model.elements.coupled import as_coupled
+from suboctave.model.elements.smoothness import levels
+
+#: Gauss nodes between rest, corners of a law and a displacement
+_NODES = 24
+#: corrections for the position of rest, and the last one in units of the position
+_CORRECTIONS, _STILL = 50, 1e-13
+
+
+def at_rest(balance: HarmonicBalance, omega: float, values: Mapping[str, float]) -> BalanceState:
+    """The system at rest under its constant loads, as a motion with one harmonic; ConvergenceError where none is found.
+
+    `omega` is the frequency that loads may depend on.
+    """
+    n = balance.size
+    balance = balance.with_basis(HarmonicBasis(1))
+    x = np.zeros((balance.basis.size, n))
+    for _ in range(_CORRECTIONS):
+        state = balance.at(x, omega, values)
+        force = state.residual[:n]
+        if not force.any():
+            return state
+        step = np.asarray(np.linalg.lstsq(state.jacobian[:n, :n], force, rcond=None)[0], dtype=float)
+        x[0] -= step
+        if length(step) <= _STILL * length(x[0]):
+            return balance.at(x, omega, values)
+    raise ConvergenceError("the constant loads have no position of rest that Newton's method finds from zero")
+
+
+def feeding(state: BalanceState, slope: bool = False) -> ComplexArray:
+    """B at the harmonics, (H + 1, size, size), or its derivative by omega: `(B X)_k = 2 omega (i Omega M x)_k`."""
+    part = state.linear.stiffness(state.frequencies, 1).real
+    if slope:
+        part = (
+            part / state.omega
+            + state.basis.multiples[:, None, None] * state.linear.stiffness(state.frequencies, 2).real
+        )
+    blocks: ComplexArray = np.asarray(-1j * state.omega * part, dtype=complex)
+    return blocks
+
+
+def action(state: BalanceState) -> float:
+    """`1 / (2 pi)` times the integral of x' . M x' over the period of the motion."""
+    # B is 2 omega M x'
+    fed = apply_blocks(feeding(state), state.x)
+    return 0.25 * float(np.vdot(state.basis.derivative(state.x), fed)) / state.rate
+
+
+def action_along(state: BalanceState, motion: Array, omega: float) -> float:
+    """The change of the action along changes of X, (dimension,), and omega, relative to it."""
+    moving, change = state.basis.derivative(state.x), state.basis.derivative(state.balance.shaped(motion))
+    fed, slope = (apply_blocks(feeding(state, by_omega), state.x) for by_omega in (False, True))
+    size = float(np.vdot(moving, fed)) or 1.0
+    return (2.0 * float(np.vdot(change, fed)) + omega * float(np.vdot(moving, slope))) / size - omega / state.omega
+
+
+def damping_ratio(state: BalanceState) -> float:
+    """zeta with which the work over a period is zero: that of the damping over that of B."""
+    moving, fed = state.basis.derivative(state.x), apply_blocks(feeding(state), state.x)
+    return float(np.vdot(moving, state.residual.reshape(moving.shape)) / (np.vdot(moving, fed) or 1.0))
+
+
+def modal_amplitude(state: BalanceState) -> float:
+    """`sqrt(c . M c)`, c the complex amplitudes at omega: that of a mode shape with unit modal mass."""
+    nu = state.basis.nu
+    c = to_complex(state.x)[nu]
+    return math.sqrt(max((c.conj() @ feeding(state)[nu] @ c).imag, 0.0) / 2.0) / state.omega
+
+
+def mean_energy(state: BalanceState) -> float:
+    """The mean of the energy over a period, zero at rest."""
+    linear, n = state.linear, state.balance.system.n
+    rest = at_rest(state.balance, state.omega, state.values).x[0]
+    moving = linear.recovered(state.frequencies, to_complex(state.x))
+    still = linear.recovered(np.zeros(1), rest[None].astype(complex)).real[0]
+    count = 4 * state.basis.harmonics + 4
+    tau = 2.0 * np.pi * np.arange(count) / count
+    waves = np.exp(1j * np.multiply.outer(tau, np.arange(len(moving))))
+    y, rate = np.real(waves @ moving), np.real((waves * (1j * state.frequencies)) @ moving)
+    mass, _, stiffness = linear.equation_of_motion()
+    way = y - still
+    energy = 0.5 * (np.sum(rate * (rate @ mass), axis=1) + np.sum(way * ((y + still) @ stiffness), axis=1))
+    for member in state.laws.members:
+        inputs, out = (linear.seen(d) for d in (member.element.inputs(n), member.element.direction(n)))
+        energy += _mean_force(member, inputs @ still, inputs @ way.T) * (way @ out)
+    # the constant part of the loads, on the unknowns
+    return float(energy.mean() - state.load[0] @ (state.x[0] - rest))
+
+
+def _mean_force(member: Member, rest: Array, way: Array) -> Array:
+    """The mean of a law's force along straight ways (m, N) from rest (m,) at zero velocity, (N,)."""
+    law = as_coupled(member.element)
+    corners = [(level - rest[0]) / np.where(way[0] == 0.0, np.inf, way[0]) for level in levels(*member[2:4])]
+    count = way.shape[1]
+    ends = np.sort(np.clip([np.zeros(count), *corners, np.ones(count)], 0.0, 1.0), axis=0)
+    nodes, weights = _gauss()
+    spans = np.diff(ends, axis=0)[:, None]
+    share = (ends[:-1, None] + spans * nodes[:, None]).reshape(-1, count)
+    q = rest[:, None, None] + share * way[:, None]
+    still = np.zeros_like(q) if member.element.depends_on_velocity else q[:0]
+    states = np.concatenate((q, still)).reshape(-1, share.size)
+    force = np.asarray(law.tangent(states, np.zeros(share.size), member.coefficients)[0]).reshape(share.shape)
+    mean: Array = np.sum((spans * weights[:, None]).reshape(share.shape) * force, axis=0)
+    return mean
+
+
+@lru_cache(maxsize=1)
+def _gauss() -> tuple[Array, Array]:
+    """Nodes and weights on (0, 1)."""
+    nodes, weights = np.polynomial.legendre.leggauss(_NODES)
+    return 0.5 * (nodes + 1.0), 0.5 * weights

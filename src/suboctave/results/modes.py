@@ -1,0 +1,170 @@
+"""Nonlinear modes as results: frequency, energy and damping over amplitude, and the forcing that reaches one."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from suboctave.errors import InputError, shortened
+from suboctave.floquet.result import FloquetResult
+from suboctave.harmonic.basis import Array, HarmonicBasis
+from suboctave.harmonic.condensed import linear_part_of
+from suboctave.harmonic.energy import action, damping_ratio, mean_energy, modal_amplitude
+from suboctave.harmonic.evaluation import BalanceState, HarmonicBalance
+from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.model.inputs import check_is_system, observed_dof
+from suboctave.model.system import System
+from suboctave.results.branch import TrackedBranch
+
+#: growth over a period that is none, where harmonics and rounding leave multipliers of a conservative motion off the
+#: unit circle
+_ON_CIRCLE = 1e-4
+
+
+class ModeCurve(TrackedBranch):
+    """A nonlinear mode over its energy; read like a `Branch` over omega, `amplitude` is that of the observed DOF.
+
+    `system` is that of the mode: without oscillating loads, of the conservative form without damping matrices.
+    `bifurcations` has extrema of omega, and branch points (`switch_branch` follows the curve that crosses there); of a
+    conservative mode limit points (LP), where the energy turns, and period doublings (PD) as well.
+    """
+
+    @property
+    def damped(self) -> bool:
+        """Whether it is the mode of a damped system (extended periodic motion concept)."""
+        return bool(self.options.get("damped"))
+
+    @property
+    def frequency(self) -> Array:
+        """Circular frequency of the mode, (len,)."""
+        return self.omega
+
+    @property
+    def energy(self) -> Array:
+        """Mean over a period of kinetic and potential energy, zero at rest, (len,); of a conservative mode its energy
+        at any time.
+        """
+        return np.array([mean_energy(orbit.state()) for orbit in self.orbits])
+
+    @property
+    def action(self) -> Array:
+        """`1 / (2 pi)` times the integral of x' . M x' over a period, (len,): `d energy = omega d action / nu` along a
+        conservative mode of nu periods.
+        """
+        return np.array([action(orbit.state()) for orbit in self.orbits])
+
+    @property
+    def modal_amplitude(self) -> Array:
+        """`sqrt(c . M c)`, c the amplitudes at omega: that of a mode shape of unit modal mass, (len,)."""
+        return np.array([modal_amplitude(orbit.state()) for orbit in self.orbits])
+
+    @property
+    def damping_ratio(self) -> Array:
+        """Modal damping ratio zeta, (len,); zero of a conservative mode."""
+        return np.array([damping_ratio(orbit.state()) for orbit in self.orbits])
+
+    @property
+    def stable(self) -> np.ndarray:
+        """Of a conservative mode whether no multiplier lies off the unit circle, (len,), bool. Of a damped one True:
+        its motions are those of no system that stands by itself, and their stability is not told.
+        """
+        return np.array([self.damped or _on_circle(point.floquet) for point in self.points], dtype=bool)
+
+    def forcing(
+        self, at: int | str | ArrayLike | None = None, system: System | None = None, harmonic: float = 1
+    ) -> Array:
+        """Amplitude of a load `F cos(harmonic omega t)` that holds the motions at phase resonance, by energy balance.
+
+        What the load puts in over a period, in quadrature with the displacement that it acts along, is what the damping
+        takes, with the mode for the motion:
+
+            F = 4 zeta <x' . M x'> / (harmonic |c|),
+
+        c the complex amplitude at `harmonic omega` of the displacement along the load, zeta <...> the work of the
+        damping along the motion (Peter, Scheel, Krack & Leine, Synthesis of nonlinear frequency responses with
+        experimentally extracted nonlinear modes, Mechanical Systems and Signal Processing 101, 2018; Hill, Cammarano,
+        Neild & Wagg, Interpreting the forced responses of a two-degree-of-freedom nonlinear oscillator using backbone
+        curves, Journal of Sound and Vibration 349, 2015).
+
+        Parameters
+        ----------
+        at
+            The DOF that the load acts on, by number or name, default the observed one; or its direction, shape (n,).
+        system
+            The system whose damping counts, default that of the mode; a conservative mode needs one. Its loads are left
+            out.
+
+        Returns
+        -------
+        Array
+            F, shape (len,); nan where the displacement along the load has no such component.
+
+        Raises
+        ------
+        InputError
+            If the mode is conservative and no system is given, or one that has not its degrees of freedom.
+        """
+        n = self.system.n
+        if system is None and not self.damped:
+            raise InputError("a conservative mode has no damping that a load would balance: give system=, one that has")
+        if system is not None:
+            check_is_system(system)
+            if system.n != n:
+                raise InputError(f"system= has {system.n} degrees of freedom, the mode has {n}")
+        direction = _direction(self, at)
+        states = [orbit.state() for orbit in self.orbits]
+        damping = states if system is None else _under(system.without_excitation(), self.orbits, self.observe)
+        found = []
+        for orbit, state, under in zip(self.orbits, states, damping, strict=True):
+            k = harmonic * orbit.basis.nu
+            index = round(k)
+            if abs(k - index) > 1e-9 or index < 1:
+                raise InputError(f"motions of {orbit.basis.nu} periods have no harmonic {harmonic:g}")
+            along = orbit.amplitudes[index] @ direction if index <= orbit.basis.harmonics else 0.0
+            # the mean power of F cos(k omega t) in quadrature is F k omega |c| / 2
+            power = 2.0 * damping_ratio(under) * state.omega * state.rate * action(state)
+            size = harmonic * state.omega * abs(along)
+            found.append(2.0 * power / size if size > 0.0 else np.nan)
+        return np.array(found)
+
+    @property
+    def _head(self) -> str:
+        values = self.omega
+        span = f"omega from {values[0]:.6g} to {values[-1]:.6g}" if len(self) else "empty"
+        form = "damped" if self.damped else "conservative"
+        leaves = "" if self.departs is None else f"leaves {self.departs}; "
+        return f"Nonlinear mode, {form}: {len(self)} points, {span}; {leaves}{self.ended}."
+
+
+def _on_circle(floquet: FloquetResult) -> bool:
+    return bool(np.all(np.abs(floquet.multipliers) <= 1.0 + np.maximum(_ON_CIRCLE, floquet.errors)))
+
+
+def _direction(curve: ModeCurve, at: int | str | ArrayLike | None) -> Array:
+    """The direction of a load, (n,)."""
+    n = curve.system.n
+    if at is None or isinstance(at, int | np.integer | str):
+        return np.asarray(np.eye(n)[curve.observe if at is None else observed_dof(curve.system, at)])
+    direction = np.asarray(at, dtype=float)
+    if direction.shape != (n,) or not np.isfinite(direction).all() or not direction.any():
+        raise InputError(f"the direction of a load has {n} finite numbers, not all zero, not {shortened(at)}")
+    return direction
+
+
+def _under(system: System, orbits: list[PeriodicOrbit], observe: int) -> list[BalanceState]:
+    """Motions with the forces of another system."""
+    highest = max((orbit.basis.harmonics + 0.5) / orbit.basis.nu * orbit.omega for orbit in orbits)
+    linear = linear_part_of(system, None, highest, None, [observe])
+    balances: dict[HarmonicBasis, HarmonicBalance] = {}
+    states = []
+    for orbit in orbits:
+        x = linear.read(orbit.coefficients)
+        if orbit.basis not in balances:
+            balances[orbit.basis] = HarmonicBalance(system, orbit.basis, linear=linear).settle(x, orbit.omega)
+        states.append(balances[orbit.basis].at(x, orbit.omega))
+    return states
+
+
+def tracked_class(kind: str) -> type[TrackedBranch]:
+    """The class of curves of a kind."""
+    return ModeCurve if kind == "nonlinear_mode" else TrackedBranch
