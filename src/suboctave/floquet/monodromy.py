@@ -278,11 +278,6 @@ class _Linearised:
         moved += 1e-15 * np.abs(exponents) + self.rounding
         return mu, np.abs(mu) * moved + math.exp(_FORGOTTEN)
 
-    @property
-    def driven(self) -> bool:
-        """Whether a load or an element sets the phase of the motion."""
-        return bool(self.state.load[1:].any()) or self.state.balance.system.excited_by_elements
-
     def _still(self) -> Array:
         """Where the periodic response begins, (N, 1), with the least change of the phase: nothing along the singular
         vector of `1 - monodromy` that is the shift in time.
@@ -302,7 +297,7 @@ class _Linearised:
         share, start = 1.0, self._start
         change = np.zeros_like(self.path)
         if len(self.active):
-            if not self.driven:
+            if not self.state.driven:
                 start = self._still()
             elif weight < 1.0:
                 start = start - (1.0 - weight) * (projector(self.before) @ start)
@@ -549,7 +544,6 @@ def _of_equation(state: BalanceState) -> FloquetResult:
 
 def _with_states(motion: _Linearised) -> tuple[ComplexArray, Array]:
     """Multipliers and errors of the blocks that have states."""
-    driven = motion.driven
     mu, shift, share = motion.multipliers(1.0)
     # there are few: numbers are quicker than arrays
     values, shifts = mu.tolist(), shift[0].tolist()
@@ -558,7 +552,7 @@ def _with_states(motion: _Linearised) -> tuple[ComplexArray, Array]:
     nearest = min(range(len(values)), key=lambda i: abs(1.0 - values[i]) - shifts[i])
     distance = abs(1.0 - values[nearest])
     moved = shifts[nearest] / share if share > 0.0 else math.inf
-    if driven and moved > _DOUBTFUL * distance:
+    if motion.state.driven and moved > _DOUBTFUL * distance:
         mu, shift, share = _beside_fold(motion, moved)
     # where the correction had to be cut, the motion is not near enough to a true one to say much
     cut = 1.0 / share - 1.0 if share > 0.0 else math.inf

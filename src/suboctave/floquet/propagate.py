@@ -226,9 +226,8 @@ def march(structures, stretch, forms, law, loose, kick, active, total, kept, act
             if kick[active[g], p] != 0.0:
                 _kick(kick[active[g], p], reading[d, 0, g * m], driven[:, g], total)
         if count > 0:
-            for s in range(size if forced else 0):
-                for j in range(columns):
-                    states[p, s, j] = total[s, j]
+            if forced:
+                states[p] = total
             _solve(reading[d], influence[d], total, values, acts, rows, count, moving, forced, a, seen, f, speed)
             _turn(moved[d], first, 0, columns, total)
             into = packed[: size * count].reshape(size, count)
@@ -236,12 +235,9 @@ def march(structures, stretch, forms, law, loose, kick, active, total, kept, act
                 for l in range(count):
                     into[s, l] = entering[d, s, rows[l]]
             np.dot(into, f[:count], added)
-            for s in range(size):
-                for j in range(columns):
-                    total[s, j] += added[s, j]
+            total += added
             for i in range(count if forced else 0):
-                for j in range(columns):
-                    solved[p, rows[i], j] = f[i, j]
+                solved[p, rows[i]] = f[i]
         else:
             for b in range(moved.shape[1]):
                 _follow(moved[d, b], waiting[b], later)

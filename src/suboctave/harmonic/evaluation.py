@@ -241,6 +241,11 @@ class BalanceState:
         return Balanced(parts[1], parts[2], size, sum(forces))
 
     @property
+    def driven(self) -> bool:
+        """Whether a load or an element sets the phase of the motion."""
+        return bool(self.load[1:].any()) or self.balance.system.excited_by_elements
+
+    @property
     def unknowns(self) -> Array:
         """Coefficients as a vector, shape (dimension,)."""
         return self.x.ravel()

@@ -42,7 +42,7 @@ class LimitCycle(Augmentation):
     @classmethod
     def of(cls, state: BalanceState) -> LimitCycle:
         """With the phase of a motion."""
-        if state.load[1:].any():
+        if state.driven:
             raise InputError("a load drives this motion: only motions that no load keeps going choose their frequency")
         return cls(state.x, state.basis, length(oscillating(state)) or 1.0)
 
