@@ -191,9 +191,9 @@ def march(structures, stretch, forms, law, loose, kick, active, total, kept, act
         The states that perturbations begin with, (kept,).
     acting, solved
         Which channels have stiffness or damping on which panels, (P, G), and all forces at the nodes,
-        (P, G m, kept + 1); empty without r. Of channels that do not act the last column alone is there.
+        (P, G m, kept + 1); of channels that do not act the last column alone.
     states
-        Those that the panels begin with on which channels act, (P, S, kept + 1), with r.
+        Those that panels begin with on which channels act, (P, S, kept + 1); with r, as `solved`.
 
     Notes
     -----
@@ -236,8 +236,8 @@ def march(structures, stretch, forms, law, loose, kick, active, total, kept, act
                     into[s, l] = entering[d, s, rows[l]]
             np.dot(into, f[:count], added)
             total += added
-            for i in range(count if forced else 0):
-                solved[p, rows[i]] = f[i]
+            if forced:
+                solved[p, rows[:count]] = f[:count]
         else:
             for b in range(moved.shape[1]):
                 _follow(moved[d, b], waiting[b], later)
