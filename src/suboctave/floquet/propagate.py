@@ -231,9 +231,8 @@ def march(structures, stretch, forms, law, loose, kick, active, total, kept, act
             _solve(reading[d], influence[d], total, values, acts, rows, count, moving, forced, a, seen, f, speed)
             _turn(moved[d], first, 0, columns, total)
             into = packed[: size * count].reshape(size, count)
-            for s in range(size):
-                for l in range(count):
-                    into[s, l] = entering[d, s, rows[l]]
+            for l in range(count):
+                into[:, l] = entering[d, :, rows[l]]
             np.dot(into, f[:count], added)
             total += added
             if forced:
