@@ -236,6 +236,9 @@ def _tell_apart(datasets: Sequence[xarray.Dataset], by_period: bool = False) -> 
     Where periods are shown they come first: "2T", "2T, j = 0"; so does what a curve shows, where that differs.
     """
     words = differing([fixed_parameters(dataset) for dataset in datasets])
+    shown = [str(dataset.attrs.get("shows", "response")) for dataset in datasets]
+    if len(set(shown)) > 1:
+        words = [[what, *own] for what, own in zip(shown, words, strict=True)]
     dofs = [int(dataset.attrs.get("observed_dof", 0)) for dataset in datasets]
     if not any(words) and not by_period and len(set(dofs)) < 2:
         return [f"curve {index + 1}" for index in range(len(datasets))]

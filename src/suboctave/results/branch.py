@@ -105,6 +105,9 @@ class Branch(CurveTables, BranchReadings):
         How long that took; nan where nobody measured.
     """
 
+    #: what its motions are, for legends
+    shows: str = "response"
+
     def __init__(
         self,
         system: System,
@@ -340,9 +343,11 @@ class TrackedBranch(Branch):
 
     def __init__(self, kind: str, names: tuple[str, ...], *args: Any, turning: str = "", **named: Any) -> None:
         super().__init__(*args, **named)
+        self.turning = turning
         self.kind = kind
         self.names = names
-        self.turning = turning
+        if self.plane is None:
+            self.shows = f"{KINDS[kind].words}s"
 
     @property
     def ended(self) -> str:

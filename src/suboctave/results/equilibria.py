@@ -30,6 +30,8 @@ class Equilibria(Branch):
         The frequency that they are written with, beyond all at which they may oscillate: a matter of the method.
     """
 
+    shows = "equilibria"
+
     @cached_property
     def positions(self) -> Array:
         """Displacements of all degrees of freedom, shape (len, n)."""

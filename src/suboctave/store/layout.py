@@ -182,6 +182,8 @@ def branch_dataset(branch: Any) -> xarray.Dataset:
             for name, value in {**branch.options, "warnings": "\n".join(branch.warnings)}.items()
         },
     )
+    if branch.shows != "response":
+        dataset = dataset.assign_attrs(shows=branch.shows)
     kind = getattr(branch, "kind", None)
     if kind is None or branch.plane is None:
         return dataset

@@ -46,6 +46,7 @@ class LimitCyclesStep(CurveStep, kind="limit_cycles", verb=limit_cycles):
     parameter: str | None = None
     bounds: Range | None = None
     omega: Range | None = None
+    unloaded: bool = False
 
     @property
     def varied(self) -> tuple[str, ...]:
