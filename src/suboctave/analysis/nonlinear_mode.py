@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -23,7 +24,7 @@ from suboctave.curves.tracked.follow import follow_tracked
 from suboctave.errors import ConvergenceError, InputError, is_number, shortened
 from suboctave.harmonic.assembly import apply_blocks
 from suboctave.harmonic.basis import Array, ComplexArray
-from suboctave.harmonic.energy import at_rest, damping_ratio, feeding
+from suboctave.harmonic.energy import at_rest, damping_ratio
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.linear_modes import linear_modes
 from suboctave.model.inputs import check_count, check_is_system, check_range, timed
@@ -37,11 +38,11 @@ _LINEAR = 1e-4
 #: share of the largest amplitude at which a mode begins that is linear
 _FIRST = 1e-3
 #: sizes of motions of unit modal mass at which forces are compared with linear ones
-_SIZES = np.geomspace(1e-12, 1e12, 289)
+_SIZES = np.geomspace(1e-12, 1e12, 289).tolist()
 #: share of a bound by which a start may miss it
 _ON_IT = 1e-9
 #: how often an interval of sizes, in powers, is halved
-_HALVED = 60
+_HALVED = 30
 #: how often a structure is projected for higher frequencies until it has the mode, and by how much higher
 _TRIES, _HIGHER = 30, 4.0
 #: damping ratio of a conservative mode beyond which its laws are not conservative
@@ -105,7 +106,7 @@ def nonlinear_mode(
         settings = settings.reporting_to(report, span, "event")
         start = _started(linear, not with_damping, ranges, settings)
         trace = follow_tracked(start, ranges, settings)
-    kept = {**options_of(settings, harmonics, ranges), "damped": with_damping, "mode": number}
+    kept = {**options_of(settings, harmonics, ranges), "damped": int(with_damping), "mode": number}
     context = {"system": free, "parameter": "omega", **kept}
     met = [replace(event, context=context) for event in trace.bifurcations]
     curve = ModeCurve(
@@ -210,12 +211,14 @@ class _LinearMode:
         change = (one.x - rest.x).ravel()
         slope = rest.force_jacobian @ change
         # of the forces of inertia, omega^2 M x
-        allowed = 0.5 * _LINEAR * length(apply_blocks(feeding(one), one.x - rest.x))
-        for before, size in zip((0.0, *_SIZES), _SIZES, strict=False):
-            bent = self.state(float(size)).force - rest.force
-            if not np.isfinite(bent).all() or length(bent.ravel() / size - slope) > allowed:
-                return float(before)
-        return math.inf
+        allowed = 0.5 * _LINEAR * length(apply_blocks(one.feeding, one.x - rest.x))
+
+        def bent(size: float) -> bool:
+            force = self.state(size).force - rest.force
+            return not np.isfinite(force).all() or length(force.ravel() / size - slope) > allowed
+
+        at = bisect_left(_SIZES, True, key=bent)
+        return math.inf if at == len(_SIZES) else _SIZES[at - 1] if at else 0.0
 
 
 def _linear_mode(

@@ -7,12 +7,12 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from suboctave.continuation.linear import distance
 from suboctave.continuation.newton import NewtonOptions, correct
 from suboctave.continuation.point import CurvePoint, between, make_point, point_between
-from suboctave.continuation.problem import Curve
+from suboctave.continuation.problem import Curve, Evaluation
 from suboctave.errors import ConvergenceError
 
 #: how often a step is halved towards the bound that it passes; Newton's method does the rest
@@ -55,10 +55,17 @@ class Measured(Range):
     """The range of what `measure` tells of a point, which is no unknown of the curve."""
 
     measure: Callable[[CurvePoint], float]
+    #: the equations at the last points with what was measured there
+    _known: list[tuple[Evaluation, float]] = field(default_factory=list, init=False, repr=False, compare=False)
 
     def value(self, point: CurvePoint) -> float:
         """What is measured at a point."""
-        return self.measure(point)
+        value = next((value for known, value in self._known if known is point.evaluation), None)
+        if value is None:
+            value = self.measure(point)
+            self._known[:-1] = []
+            self._known.append((point.evaluation, value))
+        return value
 
     def left(self, a: CurvePoint, b: CurvePoint, newton: NewtonOptions) -> CurvePoint | None:
         """See `Range.left`; a measure that comes back within a step is not noticed."""

@@ -29,6 +29,7 @@ from suboctave.floquet.held import Grip, grip
 from suboctave.floquet.methods import Monodromy, StabilityMethod
 from suboctave.floquet.result import FloquetResult
 from suboctave.harmonic.basis import Array, ComplexArray
+from suboctave.harmonic.energy import action_along
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.perturbation import Kind
@@ -200,6 +201,12 @@ class Sample:
         size = length(b.left / b.scale) * length(b.right / b.scale) * self.state.omega
         value = float(equations.gradient[2].imag)
         return 0.0 if abs(value) <= _NOTHING * size else value
+
+    @lazy
+    def action_slope(self) -> float:
+        """Change of the action along the curve, relative to it, of modes."""
+        point, n = self.point, self.curve.balance.dimension
+        return action_along(self.state, point.tangent[:n], float(point.tangent[-1]))
 
     @lazy
     def cubic(self) -> float:

@@ -6,7 +6,7 @@ the work of the element forces f taken along the straight way from rest r to x, 
 constant loads. It is constant along a motion of a conservative system; else its mean over a period is meant. With J the
 action, `omega J` twice the mean kinetic energy, `dE = omega dJ` along a family of conservative motions.
 
-M is taken from the dynamic stiffness, `-Re dA/dOmega / (2 Omega)`, so that condensed structures have their whole mass.
+B, of a damping of 2 omega per unit of mass, is that of `BalanceState.feeding`.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import numpy as np
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.aft.law import Member
 from suboctave.harmonic.assembly import apply_blocks
-from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis, to_complex
+from suboctave.harmonic.basis import Array, HarmonicBasis, to_complex
 from suboctave.harmonic.evaluation import BalanceState, HarmonicBalance, length
 from suboctave.model.elements.coupled import as_coupled
 from suboctave.model.elements.smoothness import levels
@@ -51,36 +51,24 @@ def at_rest(balance: HarmonicBalance, omega: float, values: Mapping[str, float])
     raise ConvergenceError("the constant loads have no position of rest that Newton's method finds from zero")
 
 
-def feeding(state: BalanceState, slope: bool = False) -> ComplexArray:
-    """B at the harmonics, (H + 1, size, size), or its derivative by omega: `(B X)_k = 2 omega (i Omega M x)_k`."""
-    part = state.linear.stiffness(state.frequencies, 1).real
-    if slope:
-        part = (
-            part / state.omega
-            + state.basis.multiples[:, None, None] * state.linear.stiffness(state.frequencies, 2).real
-        )
-    blocks: ComplexArray = np.asarray(-1j * state.omega * part, dtype=complex)
-    return blocks
-
-
 def action(state: BalanceState) -> float:
     """`1 / (2 pi)` times the integral of x' . M x' over the period of the motion."""
     # B is 2 omega M x'
-    fed = apply_blocks(feeding(state), state.x)
+    fed = apply_blocks(state.feeding, state.x)
     return 0.25 * float(np.vdot(state.basis.derivative(state.x), fed)) / state.rate
 
 
 def action_along(state: BalanceState, motion: Array, omega: float) -> float:
     """The change of the action along changes of X, (dimension,), and omega, relative to it."""
     moving, change = state.basis.derivative(state.x), state.basis.derivative(state.balance.shaped(motion))
-    fed, slope = (apply_blocks(feeding(state, by_omega), state.x) for by_omega in (False, True))
+    fed, slope = (apply_blocks(blocks, state.x) for blocks in (state.feeding, state.feeding_by_omega))
     size = float(np.vdot(moving, fed)) or 1.0
     return (2.0 * float(np.vdot(change, fed)) + omega * float(np.vdot(moving, slope))) / size - omega / state.omega
 
 
 def damping_ratio(state: BalanceState) -> float:
     """zeta with which the work over a period is zero: that of the damping over that of B."""
-    moving, fed = state.basis.derivative(state.x), apply_blocks(feeding(state), state.x)
+    moving, fed = state.basis.derivative(state.x), apply_blocks(state.feeding, state.x)
     return float(np.vdot(moving, state.residual.reshape(moving.shape)) / (np.vdot(moving, fed) or 1.0))
 
 
@@ -88,7 +76,7 @@ def modal_amplitude(state: BalanceState) -> float:
     """`sqrt(c . M c)`, c the complex amplitudes at omega: that of a mode shape with unit modal mass."""
     nu = state.basis.nu
     c = to_complex(state.x)[nu]
-    return math.sqrt(max((c.conj() @ feeding(state)[nu] @ c).imag, 0.0) / 2.0) / state.omega
+    return math.sqrt(max((c.conj() @ state.feeding[nu] @ c).imag, 0.0) / 2.0) / state.omega
 
 
 def mean_energy(state: BalanceState) -> float:

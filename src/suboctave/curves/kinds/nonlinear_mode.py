@@ -19,10 +19,13 @@ import numpy as np
 from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.curves.kinds.limit_cycle import CycleEquations, LimitCycle
 from suboctave.harmonic.assembly import apply_blocks, block_diagonal
-from suboctave.harmonic.basis import Array, ComplexArray
-from suboctave.harmonic.energy import damping_ratio, feeding
+from suboctave.harmonic.basis import Array
+from suboctave.harmonic.energy import damping_ratio
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.lazy import lazy
+
+#: zeta whose forces are lost among those of inertia
+_ROUNDING = float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True)
@@ -64,13 +67,8 @@ class ModeEquations(CycleEquations):
     def __init__(self, of: NonlinearMode, state: BalanceState, zeta: float, names: tuple[str, ...]) -> None:
         super().__init__(of, state, names)
         self.zeta = zeta
-        self.column = -apply_blocks(self.feeding, state.x).ravel()
+        self.column = -apply_blocks(state.feeding, state.x).ravel()
         self.addition = zeta * self.column
-
-    @lazy
-    def feeding(self) -> ComplexArray:
-        """B at the harmonics."""
-        return feeding(self.state)
 
     @lazy
     def rows(self) -> Array:
@@ -78,9 +76,9 @@ class ModeEquations(CycleEquations):
 
     def jacobian(self, names: tuple[str, ...]) -> Array:
         out, n, state = super().jacobian(names), self.state.balance.dimension, self.state
-        if self.zeta != 0.0:
-            out[:n, :n] -= self.zeta * block_diagonal(self.feeding, True)
-            out[:n, n + 1] -= self.zeta * apply_blocks(feeding(state, slope=True), state.x).ravel()
+        if abs(self.zeta) > _ROUNDING:
+            out[:n, :n] -= self.zeta * block_diagonal(state.feeding, True)
+            out[:n, n + 1] -= self.zeta * apply_blocks(state.feeding_by_omega, state.x).ravel()
         return out
 
     def renewed(self) -> NonlinearMode:

@@ -36,7 +36,6 @@ from suboctave.curves.sample import Sample
 from suboctave.errors import ConvergenceError
 from suboctave.floquet.symmetric import UNDAMPED, symmetric_functions
 from suboctave.harmonic.basis import ComplexArray
-from suboctave.harmonic.energy import action_along
 from suboctave.harmonic.perturbation import Kind
 from suboctave.kinds import MOTION_KINDS
 
@@ -156,8 +155,7 @@ class ActionTurns(CurveTest):
     at_crossings = True
 
     def value(self, sample: Sample) -> float:
-        point, n = sample.point, sample.curve.balance.dimension
-        return action_along(sample.state, point.tangent[:n], float(point.tangent[-1]))
+        return sample.action_slope
 
 
 @dataclass(frozen=True)
