@@ -20,7 +20,7 @@ VERBS = (
     ("basins", "bifurcation_diagram", "brute_force_diagram", "continue_branch", "find_isolas", "find_subharmonics")
     + ("frequency_response", "integrate", "isola_map", "locate_extremum", "lyapunov_exponents", "lyapunov_map")
     + ("periodic_orbit", "poincare_sections", "regime_map", "stepped_sine", "switch_branch", "track", "verify")
-    + ("design_margin", "equilibria", "limit_cycles", "phase_resonance", "track_peak")
+    + ("design_margin", "equilibria", "limit_cycles", "nonlinear_mode", "phase_resonance", "track_peak")
 )
 
 

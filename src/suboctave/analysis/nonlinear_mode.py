@@ -96,8 +96,8 @@ def nonlinear_mode(
     """
     check_is_system(system)
     number = check_count("mode", mode)
-    ranges = _ranges(amplitude, energy, omega)
-    free, with_damping = _free_system(system, damped)
+    ranges = ranges_of(amplitude, energy, omega)
+    free, with_damping = free_system(system, damped)
     observe = options.get("observe")
     settings = settings_of(free, {**options, "observe": system.observed_dof if observe is None else observe})
     with one_thread(), reporting(options.get("progress"), f"nonlinear mode {number}") as report:
@@ -118,8 +118,8 @@ def nonlinear_mode(
     return curve
 
 
-def _ranges(amplitude: Any, energy: Any, omega: Any) -> dict[str, Range]:
-    """The ranges that are given, by what they bound."""
+def ranges_of(amplitude: Any, energy: Any, omega: Any) -> dict[str, Range]:
+    """The ranges that are given, by what they bound; InputError."""
     ranges: dict[str, Range] = {}
     for name, given in (("amplitude", amplitude), ("energy", energy)):
         if given is None:
@@ -138,8 +138,8 @@ def _ranges(amplitude: Any, energy: Any, omega: Any) -> dict[str, Range]:
     return ranges
 
 
-def _free_system(system: System, damped: Any) -> tuple[System, bool]:
-    """The system whose mode is meant, and whether it is a damped one."""
+def free_system(system: System, damped: Any) -> tuple[System, bool]:
+    """The system whose mode is meant, and whether it is a damped one; InputError where there is none."""
     if damped not in (None, True, False):
         raise InputError(f"damped must be True, False or None, not {shortened(damped)}")
     if system.excited_by_elements:

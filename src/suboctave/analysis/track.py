@@ -35,6 +35,7 @@ from suboctave.continuation.newton import correct
 from suboctave.continuation.point import point_ahead
 from suboctave.curves.events.formulation import BorderedSystem
 from suboctave.curves.junction import repeats_earlier
+from suboctave.curves.kinds.nonlinear_mode import NonlinearMode
 from suboctave.curves.kinds.singular import SingularOperator
 from suboctave.curves.motion import MotionEvaluation, MotionProblem
 from suboctave.curves.starts import check_unknowns, harmonics_of, rule_of
@@ -311,6 +312,8 @@ def motion_kind(onto: Any) -> tuple[str, dict[str, float]] | None:
     given = dict(onto) if isinstance(onto, Mapping) else {"name": onto}
     name = given.pop("name", None)
     choices = KINDS[name].choices if name in MOTION_KINDS else None
+    if name == NonlinearMode.name:
+        raise InputError("a nonlinear mode is a curve over omega alone: so.nonlinear_mode follows it")
     if choices is None:
         if isinstance(onto, Mapping):
             raise InputError(f"onto= has no kind of motions {name!r}{suggest(str(name), MOTION_KINDS)}")
@@ -327,6 +330,11 @@ def begun(start: Any, onto: Any, observe: int | str | None) -> tuple[Any, str | 
     """What a curve begins at, and the kind that is chosen of those through it: a motion as a point of its own curve."""
     kind = motion_kind(onto)
     if kind is None:
+        if isinstance(start, TrackedEvent) and start.curve == NonlinearMode.name:
+            raise InputError(
+                f"this {start.kind} lies on a nonlinear mode, which has no curves in two parameters; switch_branch "
+                "follows what leaves a branch point or a period doubling"
+            )
         return start, onto
     if not isinstance(start, Bifurcation | BranchPoint):
         raise InputError(

@@ -74,7 +74,11 @@ class MotionEvaluation:
     def doubt(self) -> float:
         """Distance of the critical multiplier from where it should be: what the harmonics left out make of it."""
         critical = self.critical
-        return 0.0 if critical is None else float(np.abs(self.floquet.multipliers - critical).min())
+        if critical is None:
+            return 0.0
+        away = self.floquet.multipliers - critical
+        nearest = np.argsort(np.abs(away), kind="stable")[: self.curve.augmentation.trivial]
+        return float(abs(away[nearest].mean()))
 
     @lazy
     def residual(self) -> Array:

@@ -282,7 +282,8 @@ class Sample:
         if critical is None:
             return mu
         distance = np.minimum(np.abs(mu - critical), np.abs(mu - np.conj(critical)))
-        nearest, several = np.argsort(distance, kind="stable"), self.curve.augmentation.name == "NS"
+        augmentation = self.curve.augmentation
+        nearest, several = np.argsort(distance, kind="stable"), augmentation.name == "NS" or augmentation.trivial == 2
         if several or mu[nearest[0]].imag == 0.0:
             return np.delete(mu, nearest[: 2 if several else 1])
         # two that are nearly the same came out as a pair, whose sum is known better than either

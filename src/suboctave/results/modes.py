@@ -65,8 +65,9 @@ class ModeCurve(TrackedBranch):
 
     @property
     def stable(self) -> np.ndarray:
-        """Of a conservative mode whether no multiplier lies off the unit circle, (len,), bool. Of a damped one True:
-        its motions are those of no system that stands by itself, and their stability is not told.
+        """Of a conservative mode whether no multiplier lies off the unit circle but the two that are +1 by themselves,
+        (len,), bool. Of a damped one True: its motions are those of no system that stands by itself, and their
+        stability is not told.
         """
         return np.array([self.damped or _on_circle(point.floquet) for point in self.points], dtype=bool)
 
@@ -137,7 +138,10 @@ class ModeCurve(TrackedBranch):
 
 
 def _on_circle(floquet: FloquetResult) -> bool:
-    return bool(np.all(np.abs(floquet.multipliers) <= 1.0 + np.maximum(_ON_CIRCLE, floquet.errors)))
+    """Whether all multipliers but the two that are +1 by themselves lie on the unit circle."""
+    others = np.argsort(np.abs(floquet.multipliers - 1.0), kind="stable")[2:]
+    sizes, errors = np.abs(floquet.multipliers[others]), floquet.errors[others]
+    return bool(np.all(sizes <= 1.0 + np.maximum(_ON_CIRCLE, errors)))
 
 
 def _direction(curve: ModeCurve, at: int | str | ArrayLike | None) -> Array:

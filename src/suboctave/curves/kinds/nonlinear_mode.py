@@ -38,6 +38,7 @@ class NonlinearMode(LimitCycle):
     name = "nonlinear_mode"
     extras = 1
     relative = True
+    trivial = 2
 
     @classmethod
     def through(cls, item: Bifurcation, state: BalanceState, names: tuple[str, ...]) -> tuple[NonlinearMode, Array]:

@@ -13,6 +13,7 @@ from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator
 
 from suboctave.analysis.branches import check_left, continue_branch, frequency_response, switch_branch
 from suboctave.analysis.diagram import bifurcation_diagram
+from suboctave.analysis.nonlinear_mode import free_system, nonlinear_mode, ranges_of
 from suboctave.analysis.options import settings_of
 from suboctave.analysis.track import motion_kind, track
 from suboctave.bifurcation.bifurcation import CURVES_THROUGH
@@ -177,6 +178,21 @@ class Diagram(FrequencyResponse, kind="bifurcation_diagram", verb=bifurcation_di
 
     def run(self, context: Context) -> Result:
         return self.computed(context, keeper=context.keeper)
+
+
+class Mode(FollowingStep, kind="nonlinear_mode", verb=nonlinear_mode, gives="branch"):
+    """`so.nonlinear_mode` of the system."""
+
+    mode: int = Field(default=1, ge=1)
+    amplitude: float | Range | None = None
+    energy: float | Range | None = None
+    omega: Range | None = None
+    damped: bool | None = None
+
+    def check(self, around: CheckContext) -> Iterator[Complaint]:
+        yield from super().check(around)
+        yield from tried("", lambda: ranges_of(self.amplitude, self.energy, self.omega))
+        yield from tried("damped", lambda: free_system(around.system, self.damped))
 
 
 class ContinueBranch(CurveStep, kind="continue_branch", verb=continue_branch):

@@ -1,0 +1,32 @@
+"""How do two masses with a cubic spring vibrate by themselves, and with what do they share their energy?
+
+The lower nonlinear mode of Kerschen, Peeters, Golinval & Vakakis, Nonlinear normal modes, Part I (Mechanical Systems
+and Signal Processing 23, 2009) over its energy. At a branch point an internal resonance leaves it, in which the upper
+mode takes part at twice the frequency.
+
+    python ex28_nonlinear_mode.py [figure.png]
+"""
+
+import sys
+
+import numpy as np
+
+import suboctave as so
+
+system = so.System(np.eye(2), np.zeros((2, 2)), [[2.0, -1.0], [-1.0, 2.0]], elements=[so.CubicSpring(0, 0.5)])
+mode = so.nonlinear_mode(system, 1, amplitude=(0.01, 5.0))
+upper = so.nonlinear_mode(system, 2, amplitude=(0.01, 5.0))
+print(mode)
+(crossing,) = mode.bifurcations["BP"]
+tongue = so.switch_branch(crossing)
+print(tongue)
+
+if len(sys.argv) > 1:
+    so.plot([mode, tongue], sys.argv[1], labels=["lower mode", "2:1 tongue"], quantity="energy", xlabel="frequency")
+
+# At its far end the tongue meets the upper mode: the same energy at twice the frequency.
+end = tongue.bifurcations["BP"][1]
+at_end = np.interp(2.0 * end.omega, upper.omega, upper.amplitude)
+assert abs(at_end / end.amplitude - 1.0) < 2e-3, (at_end, end.amplitude)
+# Shooting (no harmonic balance) puts the branch point at this frequency.
+assert abs(crossing.omega - 1.281534) < 2e-6, crossing.omega
