@@ -28,6 +28,7 @@ from itertools import product
 import numpy as np
 
 from suboctave.bifurcation.bordered import NullVectors, bordered, null_vectors, transversality
+from suboctave.continuation.linear import length
 from suboctave.continuation.point import crossing_matrix
 from suboctave.curves.kinds.nonlinear_mode import NonlinearMode
 from suboctave.curves.kinds.singular import SingularOperator
@@ -178,8 +179,17 @@ class CurvesCross(CurveTest):
 
     @staticmethod
     def _determinant(sample: Sample) -> tuple[float, float]:
-        """Sign and logarithm of that of the crossing matrix."""
-        sign, size = np.linalg.slogdet(crossing_matrix(sample.point))
+        """Sign and logarithm of that of the crossing matrix, with the phase of the motion itself: a reference may change
+        along the curve.
+        """
+        point, state = sample.point, sample.state
+        matrix, n = crossing_matrix(point), state.balance.dimension
+        matrix[n] = 0.0
+        matrix[n, :n] = point.weights[:n] * state.basis.derivative(state.x).ravel()
+        matrix[n] /= length(matrix[n]) or 1.0
+        matrix[-1] -= (matrix[-1] @ matrix[n]) * matrix[n]
+        matrix[-1] /= length(matrix[-1]) or 1.0
+        sign, size = np.linalg.slogdet(matrix)
         return float(sign), float(size)
 
     def smooth(self, sample: Sample) -> tuple[float, float]:
