@@ -179,8 +179,8 @@ class CurvesCross(CurveTest):
 
     @staticmethod
     def _determinant(sample: Sample) -> tuple[float, float]:
-        """Sign and logarithm of that of the crossing matrix, with the phase of the motion itself: a reference may change
-        along the curve.
+        """Sign and logarithm of that of the crossing matrix, with the phase of the motion itself: that of reference may
+        change along the curve.
         """
         point, state = sample.point, sample.state
         matrix, n = crossing_matrix(point), state.balance.dimension
