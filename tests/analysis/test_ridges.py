@@ -83,3 +83,51 @@ def test_what_has_no_peak_is_refused():
         so.track_peak(response, "alpa", (0.1, 0.3))
     third = so.track_peak(response, "F", (0.15, 0.25), harmonic=3)
     assert third.kind == "harmonic_ridge"
+
+
+def test_twenty_responses_of_a_nonlinear_absorber_have_their_peaks_on_the_ridge():
+    system = so.library.nltva(F=0.05)
+    response = so.frequency_response(system, (0.8, 1.4), harmonics=5)
+    ridge = so.track_peak(response, "F", (0.02, 0.08))
+    assert len(ridge) >= 20
+    for i in np.linspace(0, len(ridge) - 1, 20).astype(int):
+        orbit = ridge.orbits[i]
+        assert abs(offset(orbit, "omega", orbit.omega, "ridge")) < 1e-7
+
+
+def damped_absorber(zeta):
+    """An absorber of a twentieth of the mass, tuned as it should be, on a mass without damping of its own."""
+    m, f = 0.05, 1.0 / 1.05
+    stiffness = [[1.0 + m * f**2, -m * f**2], [-m * f**2, m * f**2]]
+    damping = {"zeta": 2.0 * m * f * np.array([[1.0, -1.0], [-1.0, 1.0]])}
+    return so.System(np.diag([1.0, m]), damping, stiffness, loads=[so.HarmonicLoad(0, 1.0)], parameters={"zeta": zeta})
+
+
+def test_the_lowest_peak_over_the_damping_of_an_absorber():
+    """A ridge's own extremum against the closed form of the linear response."""
+    from scipy.optimize import minimize_scalar
+
+    def peak(zeta, ends):
+        mass, damping, stiffness = damped_absorber(zeta).matrices()
+
+        def response(omega):
+            return -abs(np.linalg.solve(stiffness - omega**2 * mass + 1j * omega * damping, [1.0, 0.0])[0])
+
+        return -minimize_scalar(response, bounds=ends, method="bounded", options={"xatol": 1e-12}).fun
+
+    response = so.frequency_response(damped_absorber(0.1), (0.93, 1.15), harmonics=1)
+    ridge = so.track_peak(response, "zeta", (0.05, 0.3))
+    # the ridge goes on to the valley between the two peaks, which it meets where zeta turns
+    lowest = [item for item in ridge.extrema if item.parameter_name == "amplitude"]
+    assert [item.extreme for item in lowest] == ["minimum"]
+    assert [item.parameter_name for item in ridge.extrema].count("zeta") == 1
+    # den Hartog: the height of the fixed points
+    assert lowest[0].amplitude == pytest.approx(np.sqrt(1.0 + 2.0 / 0.05), rel=1e-9)
+    best = minimize_scalar(
+        lambda z: peak(z, (0.95, 1.12)), bounds=(0.08, 0.2), method="bounded", options={"xatol": 1e-9}
+    )
+    assert lowest[0].parameters["zeta"] == pytest.approx(best.x, abs=1e-5)
+    assert lowest[0].amplitude == pytest.approx(best.fun, rel=1e-9)
+    assert "minimum of amplitude" in repr(ridge)
+    with pytest.raises(so.InputError):
+        so.track(lowest[0], "zeta", (0.1, 0.2))

@@ -208,9 +208,11 @@ class Bifurcation:
         return (self.parameter_name,)
 
     def parameter(self, name: str) -> float:
-        """omega or a parameter by name."""
+        """omega or a parameter by name; "amplitude" that."""
         if name == "omega":
             return self.omega
+        if name == "amplitude" and name not in self.parameters:
+            return self.amplitude
         if name not in self.parameters:
             raise InputError(f"unknown parameter {name!r}{suggest(name, ['omega', *self.parameters])}")
         return self.parameters[name]

@@ -367,7 +367,9 @@ class TrackedBranch(Branch):
 
     @property
     def extrema(self) -> list[Bifurcation]:
-        """Where the curve turns in one of its parameters (`parameter_name`), in the order met."""
+        """Where the curve turns in one of its parameters (`parameter_name`), on ridges also where the peaks are highest
+        or lowest (`parameter_name` "amplitude"), in the order met.
+        """
         return self.bifurcations["extremum"]
 
     @cached_property

@@ -126,6 +126,11 @@ class RidgeEquations(Equations):
         along, turning = (side * np.outer(row, reads).ravel() for row in waves)
         return size, along, turning, -side / bend if bend else 0.0
 
+    def rate(self, along: Array) -> float:
+        """Change of the amplitude along a direction (dX, ...) of the curve, relative to it."""
+        gradient = self._amplitude[1]
+        return float(gradient @ along[: len(gradient)]) / self._unit
+
     @lazy
     def _slope(self) -> float:
         """h."""

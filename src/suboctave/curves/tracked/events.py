@@ -316,7 +316,7 @@ def as_event(event: LocatedEvent, method: StabilityMethod, observe: int) -> Trac
         sample.kappa,
         arclength=sample.point.arclength,
         # a parameter changes by no more than its range along a unit of arclength
-        uncertainty=event.off * curve.spans[curve.names.index(name)],
+        uncertainty=event.off * curve.spans[curve.names.index(name)] if name in curve.names else 0.0,
         tangent=None if chord is None else tuple(chord.tolist()),
         curve=curve.augmentation.name,
         names=curve.names,

@@ -42,7 +42,7 @@ def inside(values: Mapping[str, float], ranges: Ranges) -> bool:
 
 def is_extremum(item: Any) -> TypeGuard[TrackedEvent]:
     """Whether something is an extremum along a tracked curve, the ends of isolas among them."""
-    return isinstance(item, TrackedEvent) and bool(item.extreme)
+    return isinstance(item, TrackedEvent) and bool(item.extreme) and item.parameter_name in item.names
 
 
 def on_free_phase(item: Bifurcation) -> bool:

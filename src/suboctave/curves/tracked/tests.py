@@ -1,6 +1,6 @@
 """Test functions along a curve of bifurcations: extrema of its parameters, and points of codimension two.
 
-    extremum of p     component of the tangent along p
+    extremum of p     component of the tangent along p; on ridges of the amplitude: its change over that of p
     CP                psi . R''[phi, phi] on LP curves; both components of the tangent vanish with it
     R1, R2            psi . (dJ_kappa/dkappa) phi on LP, PD curves: the multiplier is double
     R3, R4            kappa - w0/3, kappa - w0/4 on NS curves
@@ -31,6 +31,7 @@ from suboctave.bifurcation.bordered import NullVectors, bordered, null_vectors, 
 from suboctave.continuation.linear import length
 from suboctave.continuation.point import crossing_matrix
 from suboctave.curves.kinds.nonlinear_mode import NonlinearMode
+from suboctave.curves.kinds.ridge import Ridge, RidgeEquations
 from suboctave.curves.kinds.singular import SingularOperator
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.sample import Sample
@@ -144,6 +145,25 @@ class TurningPoint(Extremum):
     """The limit point of motions of a free phase: their parameter turns."""
 
     kind = "LP"
+
+
+@dataclass(frozen=True)
+class PeakTurns(CurveTest):
+    """The peaks that a ridge consists of are highest or lowest over its last parameter. Where that turns, a peak and a
+    valley meet, and the amplitude turns with it: no extremum over the parameter.
+    """
+
+    name: str = "amplitude"
+    kind = "extremum"
+
+    def value(self, sample: Sample) -> float:
+        equations = sample.evaluation.equations.own
+        assert isinstance(equations, RidgeEquations)
+        slope = sample.slopes[sample.curve.name]
+        return equations.rate(sample.point.tangent) / slope if slope != 0.0 else math.nan
+
+    def extreme(self, before: float, at: Sample) -> str:
+        return "maximum" if before * at.slopes[at.curve.name] > 0.0 else "minimum"
 
 
 @dataclass(frozen=True)
@@ -459,7 +479,8 @@ def tests_of(curve: MotionProblem) -> tuple[CurveTest, ...]:
             return (*turns, CurvesCross(), *((ActionTurns(), _CROSSINGS[0]) if own.conservative else ()))
         return (*turns[:-1], TurningPoint(curve.name), CurvesCross(), *_CROSSINGS)
     if own.name in MOTION_KINDS:
-        return (*turns, *_OF_MOTIONS)
+        peaks = (PeakTurns(),) if isinstance(own, Ridge) else ()
+        return (*turns, *peaks, *_OF_MOTIONS)
     if not isinstance(own, SingularOperator):
         return turns
     return turns + _OF_BIFURCATIONS[own.kind][: 2 if curve.balance.system.n == 1 else None]
