@@ -211,7 +211,8 @@ class _LinearMode:
         change = (one.x - rest.x).ravel()
         slope = rest.force_jacobian @ change
         # of the forces of inertia, omega^2 M x
-        allowed = 0.5 * _LINEAR * length(apply_blocks(one.feeding, one.x - rest.x))
+        momentum = apply_blocks(one.linear.feeding(one.frequencies), one.x - rest.x)
+        allowed = _LINEAR * self.omega * length(momentum)
 
         def bent(size: float) -> bool:
             force = self.state(size).force - rest.force
@@ -303,10 +304,10 @@ def _moved(point: CurvePoint, measure: str, ranges: Mapping[str, Range], setting
 
 def _work_of_laws(curve: ModeCurve) -> str | None:
     """What to say where forces of a conservative mode do work over a period."""
-    ratios = np.abs(curve.damping_ratio)
-    if curve.damped or ratios.max(initial=0.0) <= _CONSERVATIVE:
+    largest = np.abs(curve.damping_ratio).max(initial=0.0)
+    if curve.damped or largest <= _CONSERVATIVE:
         return None
     return (
-        f"the forces do work over a period, as much as a damping ratio of up to {ratios.max():.1e}: they have no "
-        "potential, and the motions are those that this damping would have"
+        f"the forces do work over a period, as much as a damping ratio of up to {largest:.1e}: they have no potential, "
+        "and the motions are those that this damping would have"
     )

@@ -82,14 +82,21 @@ class _Departure:
             # a closed curve comes back through the branch point
             last = forward.points[-1].arclength - 2.0 * gap if forward.closed else math.inf
             forward.cut(last)
-            forward.bifurcations.insert(0, replace(self.item, arclength=0.0))
+            forward.bifurcations.insert(0, self._crossed(0.0))
             return forward
         back = follow_tracked(other, self.ranges, self.settings)
         place = back.points[-1].arclength + more
         trace = back.reversed_before(forward, gap + more)
         at = sum(event.arclength < place for event in trace.bifurcations)
-        trace.bifurcations.insert(at, replace(self.item, arclength=place))
+        trace.bifurcations.insert(at, self._crossed(place))
         return trace
+
+    def _crossed(self, arclength: float) -> TrackedEvent:
+        """The branch point as one of the curve that leaves, which has that direction there."""
+        n, own = self.curve.balance.dimension, self.item.orbit.basis
+        motion = self.curve.balance.basis.resized(self.curve.balance.shaped(self.direction[:n]), own)
+        along = np.concatenate((motion.ravel(), self.direction[n:]))
+        return replace(self.item, arclength=arclength, tangent=tuple(along.tolist()))
 
 
 def switch_tracked(

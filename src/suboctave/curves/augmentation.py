@@ -112,6 +112,10 @@ class Augmentation(ABC):
     def at(self, state: BalanceState, extra: Array, names: tuple[str, ...]) -> Equations:
         """Evaluate at a motion, values of the extra unknowns, and the names of the free parameters."""
 
+    def kept_going(self, state: BalanceState, extra: Array) -> BalanceState:
+        """The motion under forces that the extra unknowns make; as a rule the same."""
+        return state
+
     def multiplier(self, rate: float, extra: Array) -> complex | None:
         """The multiplier that lies on the unit circle at a solution, None if none need; rate: the base frequency."""
         return None

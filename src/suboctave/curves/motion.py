@@ -251,7 +251,8 @@ class MotionProblem:
         x, omega, values = self.split(u)
         if not omega > 0.0:
             raise ConvergenceError("omega is not positive")
-        return MotionEvaluation(self, self.balance.at(x, omega, values), self.extra(u))
+        state, extra = self.balance.at(x, omega, values), self.extra(u)
+        return MotionEvaluation(self, self.augmentation.kept_going(state, extra) if extra.size else state, extra)
 
     def size(self, u: Array) -> float:
         """Norm of the coefficients, weighted by the square roots of the masses."""

@@ -22,6 +22,7 @@ from suboctave.continuation.point import CurvePoint
 from suboctave.curves.kinds.branch_point import BranchPointEquations
 from suboctave.curves.kinds.extremum import ExtremalEquations
 from suboctave.curves.kinds.grazing import GrazingEquations
+from suboctave.curves.kinds.nonlinear_mode import ModeEquations
 from suboctave.curves.kinds.singular import SingularEquations, SingularOperator
 from suboctave.curves.motion import MotionEvaluation, MotionProblem
 from suboctave.curves.trace import BranchPoint
@@ -175,10 +176,12 @@ class Sample:
 
     @property
     def instant_or_frequency(self) -> float:
-        """The instant tau in (0, 2 pi) of a grazing, kappa of an NS, else 0."""
+        """The instant tau in (0, 2 pi) of a grazing, kappa of an NS, zeta of a mode, else 0."""
         equations = self.evaluation.equations.own
         if isinstance(equations, GrazingEquations):
             return equations.tau % (2.0 * math.pi)
+        if isinstance(equations, ModeEquations):
+            return equations.zeta
         return self.kappa
 
     @property

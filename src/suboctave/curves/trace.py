@@ -43,9 +43,9 @@ class BranchPoint:
 class TrackedPoint(BranchPoint):
     """One point of a tracked curve: a branch point with the extra unknown and the coefficient of its normal form.
 
-    `extra` is kappa at an NS, the instant tau in (0, 2 pi) at a grazing, else 0; `coefficient` the one that decides the
-    normal form of an LP (a) or a PD (c3), else nan; `extreme` and `isola` say on a curve of extrema of which nature
-    they are (`TrackedEvent`).
+    `extra` is kappa at an NS, the instant tau in (0, 2 pi) at a grazing, zeta of a mode, else 0; `coefficient` the one
+    that decides the normal form of an LP (a) or a PD (c3), else nan; `extreme` and `isola` say on a curve of extrema of
+    which nature they are (`TrackedEvent`).
     """
 
     extra: float = 0.0

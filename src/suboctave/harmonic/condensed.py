@@ -17,6 +17,7 @@ the square of a modulus: the signs of determinants that bifurcations are told by
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -33,6 +34,8 @@ from suboctave.harmonic.linear_part import (
     damping_words,
     differentiated,
     entries_at,
+    fed_matrices,
+    feeding_matrices,
     in_words,
     natural_frequencies,
 )
@@ -281,6 +284,23 @@ class Condensed:
     @lazy
     def _symmetric(self) -> bool:
         return all(np.abs(m - m.T).max() <= _ROUNDING * np.abs(m).max() for m in self._matrices)
+
+    def fed(self, rate: float) -> Condensed:
+        """See `LinearPart.fed`; the coordinates are those of this part."""
+        whole = self._own
+        other = copy.copy(self)
+        other._last = other._other = other._wider = None
+        other._matrices = fed_matrices(self._matrices, rate)
+        vars(other).pop("_equation", None)
+        vars(other)["_own"] = whole._replace(entries=fed_matrices(whole.entries, rate))
+        return other
+
+    def feeding(self, frequency: Array) -> ComplexArray:
+        """See `LinearPart.feeding`."""
+        _, right, left = self._eliminated(frequency)
+        total = self._own._replace(entries=feeding_matrices(self._own.entries)).at(frequency, 0)
+        result: ComplexArray = total.qq - total.qz @ right + _transposed(left) @ (total.inner(right) - total.zq)
+        return np.ascontiguousarray(result)
 
     # ----------------------------------------------------------------------------------------------------- contract
     def stiffness(self, frequency: NDArray[Any], order: int = 0) -> ComplexArray:

@@ -5,8 +5,6 @@
 the work of the element forces f taken along the straight way from rest r to x, where velocities are zero, p the
 constant loads. It is constant along a motion of a conservative system; else its mean over a period is meant. With J the
 action, `omega J` twice the mean kinetic energy, `dE = omega dJ` along a family of conservative motions.
-
-B, of a damping of 2 omega per unit of mass, is that of `BalanceState.feeding`.
 """
 
 from __future__ import annotations
@@ -20,7 +18,7 @@ import numpy as np
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.aft.law import Member
 from suboctave.harmonic.assembly import apply_blocks
-from suboctave.harmonic.basis import Array, HarmonicBasis, to_complex
+from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis, to_complex
 from suboctave.harmonic.evaluation import BalanceState, HarmonicBalance, length
 from suboctave.model.elements.coupled import as_coupled
 from suboctave.model.elements.smoothness import levels
@@ -51,39 +49,69 @@ def at_rest(balance: HarmonicBalance, omega: float, values: Mapping[str, float])
     raise ConvergenceError("the constant loads have no position of rest that Newton's method finds from zero")
 
 
+#: zeta whose forces are lost among those of inertia
+_ROUNDING = float(np.finfo(float).eps)
+
+
+def fed(state: BalanceState, zeta: float) -> BalanceState:
+    """A motion with a damping of `-2 zeta omega` per unit of mass besides."""
+    if abs(zeta) <= _ROUNDING:
+        return state
+    linear = state.linear.fed(2.0 * zeta * state.omega)
+    return BalanceState(state.balance, linear, state.x, state.omega, state.values)
+
+
+def _recovered(state: BalanceState) -> ComplexArray:
+    """Complex amplitudes in the linear part's equation of motion, (H + 1, N)."""
+    return state.linear.recovered(state.frequencies, to_complex(state.x))
+
+
+def _momenta(state: BalanceState, moving: ComplexArray) -> Array:
+    """`x . M x / 2` of every harmonic, (H + 1,)."""
+    mass = state.linear.equation_of_motion()[0]
+    return 0.5 * np.einsum("ki,ij,kj->k", moving.conj(), mass, moving).real
+
+
 def action(state: BalanceState) -> float:
     """`1 / (2 pi)` times the integral of x' . M x' over the period of the motion."""
-    # B is 2 omega M x'
-    fed = apply_blocks(state.feeding, state.x)
-    return 0.25 * float(np.vdot(state.basis.derivative(state.x), fed)) / state.rate
-
-
-def action_along(state: BalanceState, motion: Array, omega: float) -> float:
-    """The change of the action along changes of X, (dimension,), and omega, relative to it."""
-    moving, change = state.basis.derivative(state.x), state.basis.derivative(state.balance.shaped(motion))
-    fed, slope = (apply_blocks(blocks, state.x) for blocks in (state.feeding, state.feeding_by_omega))
-    size = float(np.vdot(moving, fed)) or 1.0
-    return (2.0 * float(np.vdot(change, fed)) + omega * float(np.vdot(moving, slope))) / size - omega / state.omega
-
-
-def damping_ratio(state: BalanceState) -> float:
-    """zeta with which the work over a period is zero: that of the damping over that of B."""
-    moving, fed = state.basis.derivative(state.x), apply_blocks(state.feeding, state.x)
-    return float(np.vdot(moving, state.residual.reshape(moving.shape)) / (np.vdot(moving, fed) or 1.0))
+    return float(state.frequencies**2 @ _momenta(state, _recovered(state))) / state.rate
 
 
 def modal_amplitude(state: BalanceState) -> float:
     """`sqrt(c . M c)`, c the complex amplitudes at omega: that of a mode shape with unit modal mass."""
     nu = state.basis.nu
-    c = to_complex(state.x)[nu]
-    return math.sqrt(max((c.conj() @ state.feeding[nu] @ c).imag, 0.0) / 2.0) / state.omega
+    return math.sqrt(2.0 * float(_momenta(state, _recovered(state)[nu : nu + 1])[0]))
+
+
+def damping_ratio(state: BalanceState) -> float:
+    """zeta with which a damping of -2 zeta omega per unit of mass balances the work of the forces over a period."""
+    moving = state.basis.derivative(state.x)
+    momentum = apply_blocks(state.linear.feeding(state.frequencies), state.x)
+    work = -2.0 * state.omega * float(np.vdot(moving, momentum))
+    return float(np.vdot(moving, state.residual.reshape(moving.shape))) / (work or 1.0)
+
+
+def action_along(state: BalanceState, motion: Array, omega: float) -> float:
+    """The change of the action along changes of X, (dimension,), and omega, relative to it, of a conservative motion,
+    by `-Omega x . M x` as half the change of `x . A x` with Omega.
+    """
+    change = state.basis.derivative(state.balance.shaped(motion))
+    x, multiples = state.basis.derivative(state.x), state.basis.multiples[1:, None, None]
+    first, second = np.zeros((2, len(state.frequencies), state.balance.size, state.balance.size), dtype=complex)
+    # M at the harmonics, and differentiated by omega
+    moving = state.frequencies[1:, None, None]
+    first[1:] = state.linear.stiffness(state.frequencies, 1)[1:].real / moving
+    second[1:] = multiples * (state.linear.stiffness(state.frequencies, 2)[1:].real - first[1:]) / moving
+    size = float(np.vdot(x, apply_blocks(first, x))) or 1.0
+    slope = 2.0 * np.vdot(change, apply_blocks(first, x)) + omega * np.vdot(x, apply_blocks(second, x))
+    return float(slope) / size + omega / state.omega
 
 
 def mean_energy(state: BalanceState) -> float:
     """The mean of the energy over a period, zero at rest."""
     linear, n = state.linear, state.balance.system.n
     rest = at_rest(state.balance, state.omega, state.values).x[0]
-    moving = linear.recovered(state.frequencies, to_complex(state.x))
+    moving = _recovered(state)
     still = linear.recovered(np.zeros(1), rest[None].astype(complex)).real[0]
     count = 4 * state.basis.harmonics + 4
     tau = 2.0 * np.pi * np.arange(count) / count

@@ -324,32 +324,9 @@ class BalanceState:
     def linear_by(self, name: str) -> ComplexArray | None:
         """A at the harmonics differentiated by "omega" or a parameter, (H + 1, size, size); None for zero."""
         if name == "omega":
-            slope: ComplexArray = self.basis.multiples[:, None, None] * self._blocks_by_frequency
+            slope: ComplexArray = self.basis.multiples[:, None, None] * self.linear.stiffness(self.frequencies, 1)
             return slope
         return self.linear.stiffness_by(self.frequencies, (name,)) if name in self.balance.matrix_names else None
-
-    @lazy
-    def feeding(self) -> ComplexArray:
-        """B of a damping of 2 omega per unit of mass at the harmonics, `B x = 2 omega (i Omega) M x`, (H + 1, size,
-        size), with `M = -Re dA/dOmega / (2 Omega)`, so that condensed structures have their whole mass.
-        """
-        return self._fed(self._blocks_by_frequency.real)
-
-    @lazy
-    def feeding_by_omega(self) -> ComplexArray:
-        """The same differentiated by omega."""
-        bent = self.linear.stiffness(self.frequencies, 2).real
-        return self.feeding / self.omega + self._fed(self.basis.multiples[:, None, None] * bent)
-
-    def _fed(self, slope: Array) -> ComplexArray:
-        out = np.zeros(slope.shape, dtype=complex)
-        out.imag = -self.omega * slope
-        return out
-
-    @lazy
-    def _blocks_by_frequency(self) -> ComplexArray:
-        """dA/dOmega at the harmonics, (H + 1, size, size)."""
-        return self.linear.stiffness(self.frequencies, 1)
 
     @property
     def load(self) -> Array:

@@ -14,6 +14,7 @@ structure has n DOFs, its equation of motion N, and `size` of them, or direction
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 from typing import Any, Protocol, runtime_checkable
 
@@ -80,6 +81,12 @@ class LinearPart(Protocol):
 
     def covering(self, frequency: float) -> LinearPart:
         """The same part, made to serve up to a circular frequency."""
+
+    def fed(self, rate: float) -> LinearPart:
+        """The same part with the damping `C - rate M`, which feeds every motion in proportion to its momentum."""
+
+    def feeding(self, frequency: Array) -> ComplexArray:
+        """A differentiated by that rate, (F, size, size): `-i Omega M` where all degrees of freedom are unknowns."""
 
     def __hash__(self) -> int:
         """By identity: what depends on the linear part alone is kept with it as the key."""
@@ -152,6 +159,31 @@ class StructuralMatrices:
     def covering(self, frequency: float) -> StructuralMatrices:
         """The matrices serve at any frequency."""
         return self
+
+    def fed(self, rate: float) -> StructuralMatrices:
+        """See `LinearPart.fed`."""
+        other = copy.copy(self)
+        other.matrices = fed_matrices(self.matrices, rate)
+        vars(other).pop("_equation", None)
+        return other
+
+    def feeding(self, frequency: Array) -> ComplexArray:
+        """See `LinearPart.feeding`."""
+        return _blocks(feeding_matrices(self.matrices), frequency, 0)
+
+
+def fed_matrices(matrices: Array, rate: float) -> Array:
+    """M, C, K, S (4, ...) with `C - rate M` for C."""
+    result = matrices.copy()
+    result[1] -= rate * matrices[0]
+    return result
+
+
+def feeding_matrices(matrices: Array) -> Array:
+    """The same differentiated by that rate."""
+    result = np.zeros_like(matrices)
+    result[1] = -matrices[0]
+    return result
 
 
 def natural_frequencies(linear: LinearPart) -> Array:

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from suboctave.errors import InputError, shortened
 from suboctave.floquet.result import FloquetResult
-from suboctave.harmonic.basis import Array, HarmonicBasis
+from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis, to_complex, to_real
 from suboctave.harmonic.condensed import linear_part_of
-from suboctave.harmonic.energy import action, damping_ratio, mean_energy, modal_amplitude
+from suboctave.harmonic.energy import action, fed, mean_energy, modal_amplitude
 from suboctave.harmonic.evaluation import BalanceState, HarmonicBalance
-from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.model.inputs import check_is_system, observed_dof
 from suboctave.model.system import System
 from suboctave.results.branch import TrackedBranch
@@ -24,7 +25,8 @@ _ON_CIRCLE = 1e-4
 class ModeCurve(TrackedBranch):
     """A nonlinear mode over its energy; read like a `Branch` over omega, `amplitude` is that of the observed DOF.
 
-    `system` is that of the mode: without oscillating loads, of the conservative form without damping matrices.
+    `system` is that of the mode: without oscillating loads, of the conservative form without damping matrices. Of a
+    large damped structure `orbits` know the displacements that no force acts along but for what zeta makes of them.
     `bifurcations` has extrema of omega, and branch points (`switch_branch` follows the curve that crosses there); of a
     conservative mode limit points (LP), where the energy turns, and period doublings (PD) as well.
     """
@@ -40,28 +42,33 @@ class ModeCurve(TrackedBranch):
         return self.omega
 
     @property
+    def damping_ratio(self) -> Array:
+        """Modal damping ratio zeta, (len,); zero of a conservative mode."""
+        return np.array([point.extra for point in self.tracked])
+
+    def _states(self) -> Iterator[BalanceState]:
+        """Its motions with what keeps them going."""
+        for point in self.tracked:
+            yield fed(point.orbit.state(), point.extra)
+
+    @property
     def energy(self) -> Array:
         """Mean over a period of kinetic and potential energy, zero at rest, (len,); of a conservative mode its energy
         at any time.
         """
-        return np.array([mean_energy(orbit.state()) for orbit in self.orbits])
+        return np.array([mean_energy(state) for state in self._states()])
 
     @property
     def action(self) -> Array:
         """`1 / (2 pi)` times the integral of x' . M x' over a period, (len,): `d energy = omega d action / nu` along a
         conservative mode of nu periods.
         """
-        return np.array([action(orbit.state()) for orbit in self.orbits])
+        return np.array([action(state) for state in self._states()])
 
     @property
     def modal_amplitude(self) -> Array:
         """`sqrt(c . M c)`, c the amplitudes at omega: that of a mode shape of unit modal mass, (len,)."""
-        return np.array([modal_amplitude(orbit.state()) for orbit in self.orbits])
-
-    @property
-    def damping_ratio(self) -> Array:
-        """Modal damping ratio zeta, (len,); zero of a conservative mode."""
-        return np.array([damping_ratio(orbit.state()) for orbit in self.orbits])
+        return np.array([modal_amplitude(state) for state in self._states()])
 
     @property
     def stable(self) -> np.ndarray:
@@ -113,17 +120,20 @@ class ModeCurve(TrackedBranch):
             if system.n != n:
                 raise InputError(f"system= has {system.n} degrees of freedom, the mode has {n}")
         direction = _direction(self, at)
-        states = [orbit.state() for orbit in self.orbits]
-        damping = states if system is None else _under(system.without_excitation(), self.orbits, self.observe)
+        states = list(self._states())
+        if system is None:
+            own = zip(states, self.damping_ratio.tolist(), strict=True)
+            powers = [2.0 * zeta * state.omega * state.rate * action(state) for state, zeta in own]
+        else:
+            powers = list(_powers(system.without_excitation(), states, self.observe))
         found = []
-        for orbit, state, under in zip(self.orbits, states, damping, strict=True):
-            k = harmonic * orbit.basis.nu
+        for state, power in zip(states, powers, strict=True):
+            k = harmonic * state.basis.nu
             index = round(k)
             if abs(k - index) > 1e-9 or index < 1:
-                raise InputError(f"motions of {orbit.basis.nu} periods have no harmonic {harmonic:g}")
-            along = orbit.amplitudes[index] @ direction if index <= orbit.basis.harmonics else 0.0
+                raise InputError(f"motions of {state.basis.nu} periods have no harmonic {harmonic:g}")
+            along = _amplitudes(state)[index] @ direction if index <= state.basis.harmonics else 0.0
             # the mean power of F cos(k omega t) in quadrature is F k omega |c| / 2
-            power = 2.0 * damping_ratio(under) * state.omega * state.rate * action(state)
             size = harmonic * state.omega * abs(along)
             found.append(2.0 * power / size if size > 0.0 else np.nan)
         return np.array(found)
@@ -155,18 +165,27 @@ def _direction(curve: ModeCurve, at: int | str | ArrayLike | None) -> Array:
     return direction
 
 
-def _under(system: System, orbits: list[PeriodicOrbit], observe: int) -> list[BalanceState]:
-    """Motions with the forces of another system."""
-    highest = max((orbit.basis.harmonics + 0.5) / orbit.basis.nu * orbit.omega for orbit in orbits)
+def _amplitudes(state: BalanceState) -> ComplexArray:
+    """Complex amplitudes of all degrees of freedom, (H + 1, n)."""
+    linear = state.linear
+    return np.asarray(linear.shaped(linear.recovered(state.frequencies, to_complex(state.x))))
+
+
+def _powers(system: System, states: list[BalanceState], observe: int) -> Iterator[float]:
+    """The mean power that the forces of a system take from motions."""
+    highest = max((state.basis.harmonics + 0.5) * state.rate for state in states)
     linear = linear_part_of(system, None, highest, None, [observe])
     balances: dict[HarmonicBasis, HarmonicBalance] = {}
-    states = []
-    for orbit in orbits:
-        x = linear.read(orbit.coefficients)
-        if orbit.basis not in balances:
-            balances[orbit.basis] = HarmonicBalance(system, orbit.basis, linear=linear).settle(x, orbit.omega)
-        states.append(balances[orbit.basis].at(x, orbit.omega))
-    return states
+    _, damping, stiffness, structural = (part.compact(system.parameters) for part in system.linear_parts)
+    for state in states:
+        c, basis, omega = _amplitudes(state), state.basis, state.omega
+        x = linear.read(to_real(c))
+        if basis not in balances:
+            balances[basis] = HarmonicBalance(system, basis, linear=linear).settle(x, omega)
+        velocity = 1j * state.frequencies[:, None] * c
+        force = (stiffness @ c.T + damping @ velocity.T + 1j * (structural @ c.T)).T
+        of_laws = 0.5 * omega * float(np.vdot(basis.derivative(x), balances[basis].at(x, omega).force))
+        yield 0.5 * float(np.vdot(velocity, force).real) + of_laws
 
 
 def tracked_class(kind: str) -> type[TrackedBranch]:

@@ -1,8 +1,8 @@
 """Nonlinear modes: motions that no load keeps going, over their energy.
 
-    R(X, omega) - zeta B X = 0,    <D Y, X> = 0,    (B X)_k = 2 omega (i k omega) M x_k
+    R(X, omega; C - 2 zeta omega M) = 0,    <D Y, X> = 0
 
-B X is the force of a damping that is twice omega per unit of mass. Of a conservative system `zeta = 0` along the curve:
+A damping of -2 zeta omega per unit of mass is added. Of a conservative system `zeta = 0` along the curve:
 the work of all forces over a period is zero by itself, and zeta makes the equations regular though energy is
 conserved, a curve over energy (Munoz-Almaraz et al., Continuation of periodic orbits in conservative and Hamiltonian
 systems, Physica D 181, 2003). Of a damped one it feeds what damping takes, zeta is the modal damping ratio: the
@@ -18,14 +18,11 @@ import numpy as np
 
 from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.curves.kinds.limit_cycle import CycleEquations, LimitCycle
-from suboctave.harmonic.assembly import apply_blocks, block_diagonal
+from suboctave.harmonic.assembly import apply_blocks
 from suboctave.harmonic.basis import Array
-from suboctave.harmonic.energy import damping_ratio
+from suboctave.harmonic.energy import damping_ratio, fed
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.lazy import lazy
-
-#: zeta whose forces are lost among those of inertia
-_ROUNDING = float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True)
@@ -56,30 +53,32 @@ class NonlinearMode(LimitCycle):
         """See `Augmentation.no_multipliers`."""
         return "" if self.conservative else "a damped mode is the motion of no system that stands by itself"
 
+    def kept_going(self, state: BalanceState, extra: Array) -> BalanceState:
+        return fed(state, float(extra[0]))
+
     def at(self, state: BalanceState, extra: Array, names: tuple[str, ...]) -> ModeEquations:
         return ModeEquations(self, state, float(extra[0]), names)
 
 
 class ModeEquations(CycleEquations):
-    """The phase condition, and what zeta adds to R."""
+    """The phase condition, and what zeta does to R."""
 
     of: NonlinearMode
 
     def __init__(self, of: NonlinearMode, state: BalanceState, zeta: float, names: tuple[str, ...]) -> None:
         super().__init__(of, state, names)
         self.zeta = zeta
-        self.column = -apply_blocks(state.feeding, state.x).ravel()
-        self.addition = zeta * self.column
+        #: R differentiated by zeta
+        self.column: Array = 2.0 * state.omega * apply_blocks(state.linear.feeding(state.frequencies), state.x).ravel()
 
     @lazy
     def rows(self) -> Array:
         return np.insert(super().rows, self.state.balance.dimension, 0.0, axis=1)
 
     def jacobian(self, names: tuple[str, ...]) -> Array:
-        out, n, state = super().jacobian(names), self.state.balance.dimension, self.state
-        if abs(self.zeta) > _ROUNDING:
-            out[:n, :n] -= self.zeta * block_diagonal(state.feeding, True)
-            out[:n, n + 1] -= self.zeta * apply_blocks(state.feeding_by_omega, state.x).ravel()
+        out, n = super().jacobian(names), self.state.balance.dimension
+        # omega is a factor of the rate
+        out[:n, n + 1] += self.zeta / self.state.omega * self.column
         return out
 
     def renewed(self) -> NonlinearMode:

@@ -276,10 +276,14 @@ def refined(event: LocatedEvent, newton: NewtonOptions, warnings: list[str]) -> 
             finer, state = curve.finer(sample.state, basis)
             u = finer.transfer(sample.point.u, curve)
             u[: finer.balance.dimension] = state.unknowns
-            along = finer.transfer(sample.point.tangent, curve)
+            chord = event.chord() if isinstance(event.test, CurvesCross) and sample is event.sample else None
+            along = finer.transfer(sample.point.tangent if chord is None else chord, curve)
             weights = finer.weights(u, curve.size(sample.point.u))
             start = nearest_point(finer, u, weights, newton, along, BEGINNING)
             start = replace(start, arclength=sample.point.arclength)
+            if chord is not None:
+                # where curves cross the equations have no direction of their own
+                start = replace(start, tangent=along / length(weights * along))
             near = Sample(start)
             test = event.test.within(near, near)
             sample = zero_along(start, test.value, newton, _BESIDE, event.slope, factor=start.factor)

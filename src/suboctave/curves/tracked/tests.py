@@ -195,7 +195,8 @@ class CurvesCross(CurveTest):
         return sign * math.exp(min(size - self.unit, _LARGE))
 
     def within(self, a: Sample, b: Sample) -> CurveTest:
-        return replace(self, unit=max(self._determinant(sample)[1] for sample in (a, b)))
+        # where it is located again the function keeps its unit, of which nothing is left there
+        return self if a is b else replace(self, unit=max(self._determinant(sample)[1] for sample in (a, b)))
 
     @staticmethod
     def _determinant(sample: Sample) -> tuple[float, float]:
