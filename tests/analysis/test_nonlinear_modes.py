@@ -83,7 +83,7 @@ def shot(omega, guess):
         return solve_ivp(rates, (0.0, time), start, rtol=1e-12, atol=1e-13, method="DOP853").y[:, -1]
 
     period = 2.0 * np.pi / omega
-    x = fsolve(lambda x: after(x, period / 4.0)[:2], guess, xtol=1e-12)
+    x = fsolve(lambda x: after(x, period / 4.0)[:2], guess, xtol=1e-11)
     return x, np.trace(after(x, period, whole=True)[4:].reshape(4, 4))
 
 

@@ -35,6 +35,7 @@ VERBS = (
     "find_subharmonics",
     "frequency_response",
     "locate_extremum",
+    "nonlinear_mode",
     "regime_map",
     "switch_branch",
     "track",

@@ -1,4 +1,4 @@
-"""Where another curve of the same equations crosses a curve: its direction there, and its first points on both sides.
+"""Where another curve of the same equations crosses a curve: the point, the direction, first points on both sides.
 
 At a branch point of `F(u) = 0`, one equation fewer than unknowns, F_u has a null space of two dimensions. With t the
 curve's direction and phi the other one across it, psi the left null vector, a curve leaves along `s phi + r t` where
@@ -7,6 +7,14 @@ curve's direction and phi the other one across it, psi the left null vector, a c
 
 (Keller 1977), and a = 0 but for the place of the point. The second derivatives are differences of F_u, so that what is
 followed does not matter: motions of a free phase among them, whose R_X is singular all along.
+
+The equations of a curve are singular at the point itself, which they give to half the digits. With the null vectors
+psi_0, V_0 of a motion close by as borders,
+
+    [F_u psi_0; V_0 0] [v; g] = [0; 1],    F + beta psi_0 = 0,  g_1 = g_2 = 0
+
+are as many equations as unknowns, u and the unfolding beta, and regular (Govaerts, Numerical Methods for Bifurcations
+of Dynamical Equilibria, SIAM 2000); g changes by `-psi . F_uu[v, .]`.
 """
 
 from __future__ import annotations
@@ -28,10 +36,48 @@ _STEP = 1e-5
 _DISTINCT = 1e-10
 #: share of F_u's third smallest singular value above which the second is none that vanishes
 _CROSSED = 0.03
+#: corrections for the place of a crossing, the last one and how far all lead, in scaled arclength; unfolding, in units
+#: of F_u, of curves that pass each other
+_CORRECTIONS, _SETTLED, _CLOSE, _UNFOLDED = 8, 1e-10, 1e-2, 1e-8
 #: distances in scaled arclength at which the first point of the other curve is looked for
 _DISTANCES = (3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5)
 #: cosine of a first point's direction with the one that leads there, at least
 _AHEAD = 0.98
+
+
+def crossing_point(curve: Curve, u: Array, weights: Array) -> Array:
+    """The point at which two curves cross, from one close to it, (N,); ConvergenceError where it is not found close by
+    or the curves pass each other.
+    """
+    left, _, right = np.linalg.svd(curve.evaluate(u).jacobian / weights)
+    psi, borders, start, n = left[:, -1], right[-2:], u, len(left)
+    beta = 0.0
+    ends = np.concatenate((np.zeros((n, 2)), np.eye(2)))
+    for _ in range(_CORRECTIONS):
+        evaluation = curve.evaluate(u)
+        jacobian = evaluation.jacobian / weights
+        bordered = np.block([[jacobian, psi[:, None]], [borders, np.zeros((2, 1))]])
+        # (v; g) of both, and the left null vector
+        solved = np.linalg.solve(bordered, ends)
+        across = np.linalg.solve(bordered.T, np.eye(1, n + 2, n + 1)[0])[:n]
+        rows = [-_bent(curve, u, weights, across, v) for v in solved[: n + 1].T]
+        whole = np.block([[jacobian, psi[:, None]], [np.array(rows), np.zeros((2, 1))]])
+        step = np.linalg.solve(whole, -np.concatenate((evaluation.residual + beta * psi, solved[n + 1])))
+        u, beta = u + step[:-1] / weights, beta + float(step[-1])
+        if length(weights * (u - start)) > _CLOSE:
+            break
+        if length(step[:-1]) <= _SETTLED:
+            if abs(beta) > _UNFOLDED * length(jacobian.ravel()):
+                break
+            return u
+    raise ConvergenceError(f"no crossing of curves was found beside {curve.where(start)}")
+
+
+def _bent(curve: Curve, u: Array, weights: Array, psi: Array, by: Array) -> Array:
+    """`psi . F''[by, .]`, in scaled arclength."""
+    ahead, behind = (curve.evaluate(u + s * _STEP * by / weights).jacobian for s in (1.0, -1.0))
+    change: Array = psi @ ((ahead - behind) / weights) / (2.0 * _STEP)
+    return change
 
 
 def other_direction(curve: Curve, u: Array, weights: Array, tangent: Array) -> Array:
@@ -63,13 +109,7 @@ def other_direction(curve: Curve, u: Array, weights: Array, tangent: Array) -> A
         across = basis[1] - t * float(t @ basis[1])
     phi, psi = across / length(across), left[:, -1]
 
-    def bent(by: Array) -> Array:
-        """psi . F''[by, .] in scaled arclength."""
-        ahead, behind = (curve.evaluate(u + s * _STEP * by / weights).jacobian for s in (1.0, -1.0))
-        change: Array = psi @ ((ahead - behind) / weights) / (2.0 * _STEP)
-        return change
-
-    by_t, by_phi = bent(t), bent(phi)
+    by_t, by_phi = (_bent(curve, u, weights, psi, by) for by in (t, phi))
     a, b, c = float(by_t @ t), 0.5 * float(by_t @ phi + by_phi @ t), float(by_phi @ phi)
     inside = b * b - a * c
     if not inside > _DISTINCT * max(abs(a), abs(b), abs(c)) ** 2:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,6 +27,7 @@ from suboctave.curves.kinds.extremum import LimitPointExtremal
 from suboctave.curves.kinds.grazing import GrazingEquations
 from suboctave.curves.kinds.singular import SingularOperator
 from suboctave.curves.motion import MotionProblem
+from suboctave.curves.other_branch import crossing_point
 from suboctave.curves.sample import Sample
 from suboctave.curves.trace import joined
 from suboctave.curves.tracked.tests import CurvesCross, CurveTest, Cusp, Extremum
@@ -300,7 +302,21 @@ def refined(event: LocatedEvent, newton: NewtonOptions, warnings: list[str]) -> 
                     event = replace(event, off=_ROUGH * event.rough.way)
             warnings.append(words)
             break
+    if isinstance(event.test, CurvesCross):
+        sample = _crossing(sample, replace(event, sample=sample).chord())
     return event if sample is event.sample else replace(event, sample=sample)
+
+
+def _crossing(sample: Sample, chord: Array | None) -> Sample:
+    """Where curves cross, located as exactly as other events, with the direction of the curve; the same where that
+    does not succeed.
+    """
+    point, curve = sample.point, sample.curve
+    with suppress(ConvergenceError, np.linalg.LinAlgError):
+        u = crossing_point(curve, point.u, point.weights)
+        along = point.tangent if chord is None else chord / length(point.weights * chord)
+        return sample.at(replace(point, u=u, tangent=along, evaluation=curve.evaluate(u), factor=None))
+    return sample
 
 
 def as_event(event: LocatedEvent, method: StabilityMethod, observe: int) -> TrackedEvent:
