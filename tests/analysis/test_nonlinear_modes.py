@@ -92,10 +92,10 @@ def test_the_branch_point_of_two_masses_by_shooting(lower):
     (crossing,) = lower.bifurcations["BP"]
     orbit = crossing.orbit
     guess = orbit.displacement(0.0)
-    assert np.abs(orbit.velocity(0.0)).max() < 1e-6
+    assert np.abs(orbit.velocity(0.0)).max() < 1e-9
     near = [crossing.omega * (1.0 + s * 1e-3) for s in (-1.0, 1.0)]
     exact = brentq(lambda omega: shot(omega, guess)[1] - 4.0, *near, xtol=1e-12)
-    assert crossing.omega == pytest.approx(exact, rel=1e-7)
+    assert crossing.omega == pytest.approx(exact, rel=1e-9)
     assert shot(exact, guess)[0] == pytest.approx(guess, rel=1e-6)
 
 

@@ -226,9 +226,7 @@ class _Tracker(Driver):
     def _note_doubt(self, sample: Sample) -> None:
         """Whether the critical multiplier is one of the monodromy matrix, where that is known and now and then."""
         evaluation = sample.evaluation
-        # a curve without bordering vectors to renew counts no steps
-        steps = len(self.trace.points) if sample.curve.augmentation.free_phase else sample.curve.steps
-        known = evaluation.known_floquet is not None or steps % CRITICAL_EVERY == 0
+        known = evaluation.known_floquet is not None or sample.curve.steps % CRITICAL_EVERY == 0
         if known and evaluation.critical is not None:
             self.compared += 1
             doubtful = evaluation.doubt > _DOUBTFUL
