@@ -193,7 +193,7 @@ class _LinearMode:
     def point(self, size: float, conservative: bool, settings: Settings) -> CurvePoint:
         """The point of the nonlinear mode of about that size, headed to larger ones."""
         state = self.state(size)
-        curve = replace(self.curve, augmentation=NonlinearMode(state.x, state.basis, conservative))
+        curve = replace(self.curve, augmentation=NonlinearMode.at_phase(state, conservative))
         curve.force = max(state.balanced.scale, curve.least_force(state))
         u = curve.join(state.x, self.omega, np.array([damping_ratio(state)]))
 

@@ -283,8 +283,7 @@ class MotionProblem:
         x = state.x if balance is self.balance else self.balance.basis.resized(state.x, balance.basis)
         balance = balance.settle(x, state.omega, state.values)
         if balance is self.balance and augmentation is self.augmentation:
-            # of a free phase the reference stays, and steps count all the same
-            return replace(self, steps=self.steps + 1) if augmentation.free_phase else self
+            return self
         self.cache[balance.basis] = balance
         if balance.basis != self.balance.basis:
             augmentation = augmentation.resized(balance.basis, balance.size)

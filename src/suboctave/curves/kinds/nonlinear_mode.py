@@ -38,11 +38,16 @@ class NonlinearMode(LimitCycle):
     trivial = 2
 
     @classmethod
+    def at_phase(cls, state: BalanceState, conservative: bool) -> NonlinearMode:
+        """With the phase of a motion."""
+        phase = LimitCycle.of(state)
+        return cls(phase.reference, phase.basis, phase.size, conservative)
+
+    @classmethod
     def through(cls, item: Bifurcation, state: BalanceState, names: tuple[str, ...]) -> tuple[NonlinearMode, Array]:
         """See `Augmentation.through`."""
         conservative = not (item.context or {}).get("damped", False)
-        phase = LimitCycle.of(state)
-        return cls(phase.reference, phase.basis, phase.size, conservative), np.array([damping_ratio(state)])
+        return cls.at_phase(state, conservative), np.array([damping_ratio(state)])
 
     def multiplier(self, rate: float, extra: Array) -> complex | None:
         # of a damped one the multipliers of the motion are those of no motion that the system has
