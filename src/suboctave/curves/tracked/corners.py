@@ -52,6 +52,9 @@ def beyond_corner(
     row = row / size
     for way in _HEIGHTS:
         rise = -math.copysign(way * size, coming) - height
+        if rise * coming >= 0.0 or abs(rise) < 0.5 * way * size:
+            # the curve has come that far behind the corner
+            continue
         guess = point.u + rise / size * row / point.weights
         try:
             solved = correct(curve, guess, row, point.weights, newton)

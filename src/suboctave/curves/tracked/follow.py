@@ -28,9 +28,9 @@ from suboctave.curves.tracked.ends import (
     rebased,
     vanished,
 )
-from suboctave.curves.tracked.events import LocatedEvent, StepWatch, as_event, events_between, refined
+from suboctave.curves.tracked.events import LocatedEvent, StepWatch, as_event, events_between, located, refined
 from suboctave.curves.tracked.start import Ranges
-from suboctave.curves.tracked.tests import Extremum, tests_of
+from suboctave.curves.tracked.tests import CurvesCross, Extremum, tests_of
 from suboctave.errors import ConvergenceError
 
 #: range of a parameter that is not bounded
@@ -141,17 +141,27 @@ class _Tracker(Driver):
                 width = abs(float(beyond.u[i] - last.point.u[i]))
                 events.append(replace(event, isola="", uncertainty=width, arclength=middle))
 
-    @staticmethod
-    def _clear(a: CurvePoint, b: CurvePoint) -> bool:
+    def _clear(self, a: CurvePoint, b: CurvePoint) -> bool:
         """True if a step stays on its curve."""
         way = b.arclength - a.arclength
         assert isinstance(b.curve, MotionProblem)
         free = b.curve.augmentation.free_phase
-        if b.orientation != a.orientation and way > _JUMP and not free:
+        if b.orientation != a.orientation and way > _JUMP and not (free and self._crossed(Sample(a), Sample(b))):
             return False
         if way > _NEAR_END and not comes_close(Sample(a), Sample(b)):
             return False
         return keeps_subharmonics(a, b) or (free and vanished(Sample(a), Sample(b)))
+
+    def _crossed(self, a: Sample, b: Sample) -> bool:
+        """Whether the orientation changes between two points because another curve crosses there, or because motions
+        shrink to nothing; else the step has gone over to another curve, or back.
+        """
+        if vanished(a, b):
+            return True
+        try:
+            return located(CurvesCross(), a, b, self.settings.newton) is not None
+        except ConvergenceError:
+            return False
 
     def _accept(self, point: CurvePoint) -> Ending | None:
         """Take a point in; why the curve ends there or before it, if it does."""
