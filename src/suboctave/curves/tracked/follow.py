@@ -146,17 +146,18 @@ class _Tracker(Driver):
         way = b.arclength - a.arclength
         assert isinstance(b.curve, MotionProblem)
         free = b.curve.augmentation.free_phase
-        if b.orientation != a.orientation and way > _JUMP and not (free and self._crossed(Sample(a), Sample(b))):
+        if b.orientation != a.orientation and way > _JUMP and not (free and self._crossed(Sample(b))):
             return False
         if way > _NEAR_END and not comes_close(Sample(a), Sample(b)):
             return False
         return keeps_subharmonics(a, b) or (free and vanished(Sample(a), Sample(b)))
 
-    def _crossed(self, a: Sample, b: Sample) -> bool:
-        """Whether the orientation changes between two points because another curve crosses there, or because motions
-        shrink to nothing; else the step has gone over to another curve, or back.
+    def _crossed(self, b: Sample) -> bool:
+        """Whether the orientation has changed since the last point because another curve crosses there, or because
+        motions shrink to nothing; else the step has gone over to another curve, or back.
         """
-        if vanished(a, b):
+        a = self.previous
+        if a is None or vanished(a, b):
             return True
         try:
             return located(CurvesCross(), a, b, self.settings.newton) is not None
