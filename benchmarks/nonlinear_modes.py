@@ -40,7 +40,8 @@ def per_point(work: Callable[[], so.Branch]) -> float:
 def main(repeats: int) -> None:
     print(f"{'case':<12}{'response':>14}{'conservative':>20}{'damped':>20}   ms a point, and ratio to the response")
     for name, (system, omega, amplitude) in cases().items():
-        for harmonics in (9, "adaptive"):
+        # of many undamped masses some is in resonance with every higher harmonic: there the rule asks for more and more
+        for harmonics in (9, "adaptive") if system.n < 10 else (9,):
             works: list[Callable[[], so.Branch]] = [
                 lambda s=system, w=omega, h=harmonics: so.frequency_response(s, w, h)
             ]

@@ -216,6 +216,18 @@ def test_constant_loads_stay():
     assert [x.min(), x.max()] == pytest.approx(turns, abs=1e-4)
 
 
+def test_gyroscopic_coupling_takes_no_energy():
+    """Backward and forward whirl: `omega = sqrt(1 + g^2 / 4) -+ g / 2` where it is small."""
+    g, springs = 0.4, [so.CubicSpring(0, 1.0), so.CubicSpring(1, 1.0)]
+    system = so.System(np.eye(2), [[0.0, -g], [g, 0.0]], np.eye(2), springs)
+    for number, side in ((1, -1.0), (2, 1.0)):
+        mode = so.nonlinear_mode(system, number, amplitude=(1e-3, 1.0))
+        assert not mode.damped
+        assert mode.omega[0] == pytest.approx(np.sqrt(1.0 + g**2 / 4.0) + side * g / 2.0, rel=1e-5)
+        assert np.abs(mode.damping_ratio).max() < 1e-9
+        assert np.gradient(mode.energy, mode.action)[5:-5] == pytest.approx(mode.omega[5:-5], rel=1e-2)
+
+
 def test_a_stop_begins_where_it_is_reached():
     """x'' + x + 20 max(x - 1, 0): harmonic up to 1, then a half period of each spring."""
     mode = so.nonlinear_mode(so.System(1.0, 0.0, 1.0, [so.ElasticStop(0, 20.0, 1.0)]), amplitude=(0.5, 2.0))

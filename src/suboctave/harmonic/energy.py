@@ -4,7 +4,8 @@
 
 the work of the element forces f taken along the straight way from rest r to x, where velocities are zero, p the
 constant loads. It is constant along a motion of a conservative system; else its mean over a period is meant. With J the
-action, `omega J` twice the mean kinetic energy, `dE = omega dJ` along a family of conservative motions.
+action, `dE = omega dJ` along a family of conservative motions, and `omega J` is twice the mean kinetic energy where no
+gyroscopic forces act.
 """
 
 from __future__ import annotations
@@ -66,21 +67,27 @@ def _recovered(state: BalanceState) -> ComplexArray:
     return state.linear.recovered(state.frequencies, to_complex(state.x))
 
 
-def _momenta(state: BalanceState, moving: ComplexArray) -> Array:
-    """`x . M x / 2` of every harmonic, (H + 1,)."""
-    mass = state.linear.equation_of_motion()[0]
-    return 0.5 * np.einsum("ki,ij,kj->k", moving.conj(), mass, moving).real
-
-
 def action(state: BalanceState) -> float:
-    """`1 / (2 pi)` times the integral of x' . M x' over the period of the motion."""
-    return float(state.frequencies**2 @ _momenta(state, _recovered(state))) / state.rate
+    """`1 / (2 pi)` times the integral of `p . x'` over the period of the motion, `p = M x' + G x / 2` with G the
+    gyroscopic part of the damping matrix.
+    """
+    mass, damping, _ = state.linear.equation_of_motion()
+    moving = _recovered(state)
+    velocity = 1j * state.frequencies[:, None] * moving
+    momentum = velocity @ mass.T + 0.25 * moving @ (damping - damping.T).T
+    return 0.5 * float(np.vdot(velocity, momentum).real) / state.rate
+
+
+def twice_kinetic(state: BalanceState) -> float:
+    """The mean of `x' . M x'`, twice the kinetic energy."""
+    mass, velocity = state.linear.equation_of_motion()[0], 1j * state.frequencies[:, None] * _recovered(state)
+    return 0.5 * float(np.vdot(velocity, velocity @ mass.T).real)
 
 
 def modal_amplitude(state: BalanceState) -> float:
     """`sqrt(c . M c)`, c the complex amplitudes at omega: that of a mode shape with unit modal mass."""
-    nu = state.basis.nu
-    return math.sqrt(2.0 * float(_momenta(state, _recovered(state)[nu : nu + 1])[0]))
+    mass, c = state.linear.equation_of_motion()[0], _recovered(state)[state.basis.nu]
+    return math.sqrt(max(float((c.conj() @ mass @ c).real), 0.0))
 
 
 def damping_ratio(state: BalanceState) -> float:
@@ -92,19 +99,14 @@ def damping_ratio(state: BalanceState) -> float:
 
 
 def action_along(state: BalanceState, motion: Array, omega: float) -> float:
-    """The change of the action along changes of X, (dimension,), and omega, relative to it, of a conservative motion,
-    by `-Omega x . M x` as half the change of `x . A x` with Omega.
+    """The change of the action along changes of X, (dimension,), and omega, relative to it, of a conservative motion:
+    the action is `-1/4` times the sum of `k c . (dA/dOmega) c` over its harmonics c.
     """
-    change = state.basis.derivative(state.balance.shaped(motion))
-    x, multiples = state.basis.derivative(state.x), state.basis.multiples[1:, None, None]
-    first, second = np.zeros((2, len(state.frequencies), state.balance.size, state.balance.size), dtype=complex)
-    # M at the harmonics, and differentiated by omega
-    moving = state.frequencies[1:, None, None]
-    first[1:] = state.linear.stiffness(state.frequencies, 1)[1:].real / moving
-    second[1:] = multiples * (state.linear.stiffness(state.frequencies, 2)[1:].real - first[1:]) / moving
-    size = float(np.vdot(x, apply_blocks(first, x))) or 1.0
-    slope = 2.0 * np.vdot(change, apply_blocks(first, x)) + omega * np.vdot(x, apply_blocks(second, x))
-    return float(slope) / size + omega / state.omega
+    k = state.basis.multiples[:, None, None]
+    first, second = (k**order * state.linear.stiffness(state.frequencies, order) for order in (1, 2))
+    held = apply_blocks(first, state.x)
+    change = 2.0 * np.vdot(state.balance.shaped(motion), held) + omega * np.vdot(state.x, apply_blocks(second, state.x))
+    return float(change) / (float(np.vdot(state.x, held)) or 1.0)
 
 
 def mean_energy(state: BalanceState) -> float:

@@ -11,7 +11,7 @@ from suboctave.errors import InputError, shortened
 from suboctave.floquet.result import FloquetResult
 from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis, to_complex, to_real
 from suboctave.harmonic.condensed import linear_part_of
-from suboctave.harmonic.energy import action, fed, mean_energy, modal_amplitude
+from suboctave.harmonic.energy import action, fed, mean_energy, modal_amplitude, twice_kinetic
 from suboctave.harmonic.evaluation import BalanceState, HarmonicBalance
 from suboctave.model.inputs import check_is_system, observed_dof
 from suboctave.model.system import System
@@ -60,8 +60,8 @@ class ModeCurve(TrackedBranch):
 
     @property
     def action(self) -> Array:
-        """`1 / (2 pi)` times the integral of x' . M x' over a period, (len,): `d energy = omega d action / nu` along a
-        conservative mode of nu periods.
+        """`1 / (2 pi)` times the integral of momenta over displacements, x' . M x' without gyroscopic forces, over a
+        period, (len,): `d energy = omega d action / nu` along a conservative mode of nu periods.
         """
         return np.array([action(state) for state in self._states()])
 
@@ -123,7 +123,7 @@ class ModeCurve(TrackedBranch):
         states = list(self._states())
         if system is None:
             own = zip(states, self.damping_ratio.tolist(), strict=True)
-            powers = [2.0 * zeta * state.omega * state.rate * action(state) for state, zeta in own]
+            powers = [2.0 * zeta * state.omega * twice_kinetic(state) for state, zeta in own]
         else:
             powers = list(_powers(system.without_excitation(), states, self.observe))
         found = []

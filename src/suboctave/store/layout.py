@@ -281,7 +281,7 @@ QUANTITIES: Mapping[str, Quantity] = {
     "transmitted_force": Quantity("largest |force| on the ground over a period", "force", "peak force on the ground"),
     "transmissibility": Quantity("force on the ground over force applied, first harmonics", "1", "transmissibility"),
     "energy": Quantity("mean kinetic and potential energy, zero at rest", "energy", "energy"),
-    "action": Quantity("integral of x' . M x' over a period, over 2 pi", "energy * time", "action"),
+    "action": Quantity("integral of momenta over displacements in a period, over 2 pi", "energy * time", "action"),
     "modal_amplitude": Quantity("sqrt(c . M c) of the amplitudes c at omega", "length * sqrt(mass)", "modal amplitude"),
     "damping_ratio": Quantity("work over a period in units of that of a damping 2 omega M", "1", "damping ratio"),
 }

@@ -477,7 +477,12 @@ def tests_of(curve: MotionProblem) -> tuple[CurveTest, ...]:
         if curve.augmentation.turning or own.name not in MOTION_KINDS:
             return turns
         if isinstance(own, NonlinearMode):
-            return (*turns, CurvesCross(), *((ActionTurns(), _CROSSINGS[0]) if own.conservative else ()))
+            # the determinant of J_half costs less than multipliers, which nothing else asks for at every point
+            return (
+                *turns,
+                CurvesCross(),
+                *((ActionTurns(), RealCrossing("PD", Kind.HALF)) if own.conservative else ()),
+            )
         return (*turns[:-1], TurningPoint(curve.name), CurvesCross(), *_CROSSINGS)
     if own.name in MOTION_KINDS:
         peaks = (PeakTurns(),) if isinstance(own, Ridge) else ()
