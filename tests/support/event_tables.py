@@ -31,14 +31,18 @@ GALLERY = sorted((ROOT / "examples" / "gallery").glob("fig*.py"))
 VERBS = (
     "bifurcation_diagram",
     "continue_branch",
+    "equilibria",
     "find_isolas",
     "find_subharmonics",
     "frequency_response",
+    "limit_cycles",
     "locate_extremum",
     "nonlinear_mode",
+    "phase_resonance",
     "regime_map",
     "switch_branch",
     "track",
+    "track_peak",
 )
 #: seeds of random systems whose tables are kept, and of those with strong loads
 RANDOM, STRONG = range(300, 340), range(330, 340)
