@@ -21,7 +21,7 @@ tongue = so.switch_branch(crossing, bounds=(1.2, 1.39))
 print(tongue)
 
 if len(sys.argv) > 1:
-    so.plot([mode, tongue], sys.argv[1], labels=["lower mode", "2:1 tongue"], quantity="energy", xlabel="frequency")
+    so.plot([mode, tongue], sys.argv[1], labels=["lower mode", "2:1 tongue"], quantity="energy")
 
 # Shooting (no harmonic balance) puts the branch point at this frequency.
 assert abs(crossing.omega - 1.281534) < 2e-6, crossing.omega

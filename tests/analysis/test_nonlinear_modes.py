@@ -350,3 +350,16 @@ def test_the_page_says_what_it_prints(capsys, tmp_path, monkeypatch):
         assert re.sub(NUMBER, "", printed).split() == re.sub(NUMBER, "", text).split()
         ours, theirs = (np.array([float(one) for one in re.findall(NUMBER, part)]) for part in (printed, text))
         np.testing.assert_allclose(ours, theirs, rtol=1e-3, atol=1e-6)
+
+
+def test_motions_of_modes_against_shooting(tmp_path):
+    stiffness = np.array([[2.0, -1.0], [-1.0, 2.0]])
+    spring = [so.CubicSpring(0, 0.5)]
+    mode = so.nonlinear_mode(so.System(np.eye(2), np.zeros((2, 2)), stiffness, spring), 1, amplitude=(0.01, 3.0))
+    for item in (mode.points[len(mode) // 2], mode.points[-1], mode.bifurcations["BP"][0]):
+        assert so.verify(item).agrees
+    so.plot(mode, tmp_path / "mode.png", quantity="energy")
+    damped = so.nonlinear_mode(so.System(np.eye(2), 0.02 * stiffness, stiffness, spring), 1, amplitude=(0.01, 1.0))
+    with pytest.raises(so.InputError, match="the motion of no system that stands by itself"):
+        so.verify(damped.points[-1])
+    assert not so.stability(damped.points[-1]).applicable

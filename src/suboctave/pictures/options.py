@@ -320,6 +320,9 @@ class Coordinates:
         view, texts = self.view, []
         for index, name in enumerate(self.names):
             text = view.of_omega if name == "omega" else view.label(datasets) if name is None else name
+            if name == "omega" and datasets and all("shows" in dataset.attrs for dataset in datasets):
+                # of motions that nothing drives
+                text = text.removeprefix("forcing ")
             unit = view.unit if index == self._scaled else None
             if name is None and view.in_degrees and view.unit is None:
                 unit = "°"

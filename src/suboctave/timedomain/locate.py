@@ -39,6 +39,7 @@ _NEARLY_SINGULAR = 1e-5  # relative singular value below which a BP's second dir
 _NO_BRANCH_POINT = 1e-4
 _IDLE = 3  # iterations without a bracket in which the test function may fail to fall to half
 _CYCLE = 1e-11  # residual of a motion that nothing drives
+_CONSERVED = 1e-6  # logarithm of the volume of states after a period, of motions that conserve energy
 _REAL_MULTIPLIER = 1e-5  # imaginary part below which a pair on the unit circle is taken for two real multipliers
 
 
@@ -203,8 +204,11 @@ def shoot_cycle(
     """
     start = np.array(state, dtype=float)
     model = scaled_field(system, start, omega, values)
-    curve = Curve(model, periods, rtol, _CYCLE, branch_point=False)
     u, dof = np.append(start / model.scale, 1.0), observed_dof(system, observe)
+    curve = Curve(model, periods, rtol, _CYCLE, branch_point=False)
+    if corrected and abs(np.linalg.slogdet(curve.evaluate(u)[2])[1]) < _CONSERVED:
+        # motions of one frequency after the other: the direction towards them is not corrected either
+        curve.cut = _NEARLY_SINGULAR
     if corrected:
         point = curve.onto(u, None)
         u, transition, residual = point.u, point.transition, point.residual

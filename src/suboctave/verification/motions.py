@@ -74,9 +74,10 @@ def verify_motion(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: fl
     """A motion against shooting, a bifurcation against its location by shooting (`verification.verify`)."""
     motion = motion_of(what)
     system = system_of_motions([motion])
-    floquet = (
-        what.floquet if isinstance(what, BranchPoint | Bifurcation) else method_of(None).multipliers(motion.state())
-    )
+    known = None if isinstance(what, PeriodicOrbit) else what.floquet
+    floquet = known or method_of(None).multipliers(motion.state())
+    if floquet.method == "none":
+        raise InputError(f"there is nothing to hold this motion against: {floquet.note}")
     whole = motion.start()
     start = system.reduced(whole)
     projection = system if isinstance(system, ProjectedSystem) else None

@@ -76,6 +76,9 @@ def stability(
     """
     chosen = method_of(method)
     motion = motion_of(orbit)
+    if isinstance(orbit, BranchPoint | Bifurcation) and orbit.floquet.method == "none":
+        # the motion of no system that stands by itself
+        return orbit.floquet
     with one_thread():
         return chosen.multipliers(motion.state())
 
@@ -92,7 +95,7 @@ def _verify_branch(
 ) -> BranchVerification:
     if isinstance(branch, TrackedBranch):
         raise InputError(
-            "this is a curve of bifurcations in two parameters: take its points or its .bifurcations one by one"
+            f"a {branch.kind} curve is verified motion by motion: take its points or its .bifurcations one by one"
         )
     if not len(branch):
         raise InputError("the branch has no points to verify")
