@@ -86,6 +86,8 @@ class Equations:
         self._all_names = sorted({name for names in self._names for name in names})
         #: of every element: values of its names, and what it is there; of all elements: the same
         self._members: dict[int, tuple[tuple[float, ...], Member]] = {}
+        #: displacements of degrees of freedom by the unknown ones
+        self._along: dict[int, Array] = {}
         #: the laws at the equations' own values (True), and at the last others, with the values of their names
         self._laws: dict[bool, tuple[tuple[float, ...] | None, Laws]] = {}
         self._write_in(basis, (None,) * len(system.elements) if samples is None else samples)
@@ -118,6 +120,14 @@ class Equations:
         out = np.asarray(self.linear.retain(element.direction(n)), dtype=float)
         inputs = np.array([self.linear.retain(d) for d in element.inputs(n)], dtype=float)
         return Group(out, inputs, (i,), element.depends_on_velocity)
+
+    def along(self, dof: int) -> Array:
+        """The displacement of a degree of freedom by the unknown ones, (size,); InputError where they do not hold it."""
+        if dof not in self._along:
+            unit = np.zeros(self.system.n)
+            unit[dof] = 1.0
+            self._along[dof] = self.linear.retain(unit)
+        return self._along[dof]
 
     @lazy
     def directions(self) -> Sparse:

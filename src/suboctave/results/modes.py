@@ -158,7 +158,9 @@ def _direction(curve: ModeCurve, at: int | str | ArrayLike | None) -> Array:
     """The direction of a load, (n,)."""
     n = curve.system.n
     if at is None or isinstance(at, int | np.integer | str):
-        return np.asarray(np.eye(n)[curve.observe if at is None else observed_dof(curve.system, at)])
+        direction = np.zeros(n)
+        direction[curve.observe if at is None else observed_dof(curve.system, at)] = 1.0
+        return direction
     direction = np.asarray(at, dtype=float)
     if direction.shape != (n,) or not np.isfinite(direction).all() or not direction.any():
         raise InputError(f"the direction of a load has {n} finite numbers, not all zero, not {shortened(at)}")

@@ -53,7 +53,7 @@ class PhaseEquations(Equations):
         self.at = int(of.order * 2 * state.basis.nu) - 1
         if self.at > len(state.x) - 2:
             raise ConvergenceError(f"the harmonic at {of.order} omega is not kept")
-        self.reads = state.linear.retain(np.eye(state.balance.system.n)[of.dof])
+        self.reads = state.balance.along(of.dof)
         z = complex(*(state.x[self.at : self.at + 2] @ self.reads)).conjugate()
         f, (k, q) = self._conjugate(state.load), of.order.as_integer_ratio()
         self.product, self.by_z, self.by_f = z**q * f**k, q * z ** (q - 1) * f**k, k * z**q * f ** (k - 1)

@@ -103,7 +103,7 @@ class RidgeEquations(Equations):
     def _amplitude(self) -> tuple[float, Array, Array, float]:
         """The amplitude G, G_X, and the part `c b b^T` of its second derivative: b and c."""
         state = self.state
-        reads = state.linear.retain(np.eye(state.balance.system.n)[self.of.dof])
+        reads = state.balance.along(self.of.dof)
         c = to_complex(state.x) @ reads
         if self.of.multiple is not None:
             at = 2 * harmonic_index(self.of.multiple, state.basis.nu) - 1
