@@ -32,6 +32,7 @@ from suboctave.model.system import System
 from suboctave.options import with_options
 from suboctave.progress import reporting
 from suboctave.results.modes import ModeCurve
+from suboctave.structures.frequencies import natural_frequencies
 
 #: share by which forces deviate from linear ones where a mode begins
 _LINEAR = 1e-4
@@ -45,6 +46,8 @@ _ON_IT = 1e-9
 _HALVED = 30
 #: how often a structure is projected for higher frequencies until it has the mode, and by how much higher
 _TRIES, _HIGHER = 30, 4.0
+#: frequency that it is projected for first, in units of that of the structure without its elements
+_ABOVE = 1.5
 #: damping ratio of a conservative mode beyond which its laws are not conservative
 _CONSERVATIVE = 1e-6
 #: share of a matrix that is rounding
@@ -226,9 +229,7 @@ def _linear_mode(
     system: System, number: int, omega: Range | None, harmonics: Harmonics, settings: Settings
 ) -> _LinearMode:
     """A linear mode of a system, its linear part made to serve at its frequency."""
-    mass, _, stiffness = (np.diag(matrix) for matrix in system.matrices())
-    squares = stiffness / np.where(mass == 0.0, np.inf, mass)
-    served = max(omega) if omega else math.sqrt(min(squares[squares > 0.0], default=1.0))
+    served = max(omega) if omega else _ABOVE * _about(system, number)
     found = np.zeros(0)
     for _ in range(_TRIES):
         curve = make_curve(system, "omega", served, 0.0, harmonics, 1, None, settings.observe)
@@ -242,6 +243,14 @@ def _linear_mode(
             return _LinearMode(replace(curve, spans=(span,)), own, shapes[number - 1], rest.x[0])
         served *= _HIGHER
     raise InputError(f"the system has {len(found)} modes that oscillate about its position of rest, no mode {number}")
+
+
+def _about(system: System, number: int) -> float:
+    """About the frequency of a mode: that of the structure without its elements, where it has one."""
+    mass, stiffness = (part.sparse_value(system.parameters) for part in (system.mass, system.stiffness))
+    found = natural_frequencies(mass, stiffness, number).omega
+    own = found[found > 0.0]
+    return float(own[-1]) if own.size else 1.0
 
 
 def _started(linear: _LinearMode, conservative: bool, ranges: Mapping[str, Range], settings: Settings) -> CurvePoint:

@@ -122,7 +122,7 @@ class Equations:
         return Group(out, inputs, (i,), element.depends_on_velocity)
 
     def along(self, dof: int) -> Array:
-        """The displacement of a degree of freedom by the unknown ones, (size,); InputError where they do not hold it."""
+        """The displacement of a degree of freedom by those unknown, (size,); InputError where they do not hold it."""
         if dof not in self._along:
             unit = np.zeros(self.system.n)
             unit[dof] = 1.0
