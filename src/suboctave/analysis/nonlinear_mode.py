@@ -150,8 +150,7 @@ def free_system(system: System, damped: Any) -> tuple[System, bool]:
     free = system.without_excitation()
     moving = [element.label for element in free.elements if element.depends_on_velocity]
     gyroscopic, damping = _damping(free)
-    _, _, stiffness = free.matrices()
-    skew = float(np.abs(stiffness - stiffness.T).max()) > _ROUNDING * float(np.abs(stiffness).max())
+    skew, _ = _sides(free.stiffness.sparse_value(free.parameters))
     with_damping = damped if damped is not None else bool(moving or damping or skew)
     if with_damping:
         return free, True
@@ -168,10 +167,15 @@ def free_system(system: System, damped: Any) -> tuple[System, bool]:
 
 def _damping(system: System) -> tuple[bool, bool]:
     """Whether the damping matrix has a gyroscopic part, and whether there is damping in matrices."""
-    _, damping, _ = system.matrices()
-    least = _ROUNDING * float(np.abs(damping).max())
-    skew, own = (float(np.abs(damping + side * damping.T).max()) > least for side in (-1.0, 1.0))
+    skew, own = _sides(system.damping.sparse_value(system.parameters))
     return skew, own or not system.structural.zero
+
+
+def _sides(matrix: Any) -> tuple[bool, bool]:
+    """Whether a sparse matrix has a skew-symmetric part, and a symmetric one."""
+    least = _ROUNDING * float(abs(matrix).max())
+    skew, symmetric = (float(abs(matrix + side * matrix.T).max()) > least for side in (-1.0, 1.0))
+    return skew, symmetric
 
 
 @dataclass(frozen=True, eq=False)
