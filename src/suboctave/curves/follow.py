@@ -8,6 +8,7 @@ from bisect import insort
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from suboctave.continuation.ending import Ending, EndReason
 from suboctave.continuation.events import Bracket
 from suboctave.continuation.march import Arrival
 from suboctave.continuation.point import point_between, solved_again
-from suboctave.curves.events.grazings import locate_grazings, touches
+from suboctave.curves.events.grazings import locate_grazings
 from suboctave.curves.events.layer import behind_their_grazings
 from suboctave.curves.events.monitors import (
     BRANCH_POINT,
@@ -26,7 +27,6 @@ from suboctave.curves.events.monitors import (
     Located,
     changes,
     locate,
-    locate_near,
     solved_by,
 )
 from suboctave.curves.guard import Crossing, GuardedStep, StepGuard
@@ -34,7 +34,7 @@ from suboctave.curves.identity import relation
 from suboctave.curves.junction import UNSEEN, Meeting, meeting
 from suboctave.curves.ledgers import REASON, CountCheck, DoublingWatch, HiddenDoublings, pair_in
 from suboctave.curves.motion import MotionProblem
-from suboctave.curves.refine import bifurcation_at, solved_bifurcation, turns_at
+from suboctave.curves.refine import bifurcation_at, solved_bifurcation, solved_in, turns_at
 from suboctave.curves.sample import Sample
 from suboctave.curves.trace import Settings, Trace, joined
 from suboctave.errors import ConvergenceError, InputError
@@ -121,6 +121,9 @@ _NOT_FOUND = {
 }
 
 
+_UNSEARCHED = "other harmonics change what has happened there, and it could not be searched with them"
+
+
 def follow(start: CurvePoint, direction: float, bounds: tuple[float, float], settings: Settings) -> Trace:
     """Follow a response curve from a solved start; KeyboardInterrupt ends it politely."""
     return _Follower(start, direction, bounds, settings).run()
@@ -137,8 +140,10 @@ class _Follower(Driver):
         self._again: tuple[Sample, MotionProblem, Sample] | None = None
         self._count = CountCheck()
         self._hidden = HiddenDoublings()
-        #: bifurcations that only more harmonics than the step's have shown
-        self._shown: list[Bifurcation] = []
+        #: the samples of the last step
+        self._passed: list[Sample] = []
+        #: bifurcations listed that other harmonics show farther ahead, where they may be met again
+        self._ahead: list[Bifurcation] = []
         self._last_located: tuple[BifurcationKind, Sample, Sample, Located | None] | None = None
         self._turned: Bifurcation | None = None
         self._meeting: tuple[CurvePoint, CurvePoint, Meeting] | None = None
@@ -269,8 +274,8 @@ class _Follower(Driver):
             self.trace.points.append(new.as_point(new.verdict))
             self.previous = new
         step, self._step = self._step, None
-        if step is not None:
-            self._look_behind(step.inside)
+        self._passed = [] if step is None else step.inside
+        self._look_behind(self._passed)
         self._report(point)
         if self._keeper is not None:
             self._keeper(self.trace)
@@ -290,40 +295,84 @@ class _Follower(Driver):
             for item in items:
                 if self._insert(item):
                     self._count.noted(item)
+                    self._ahead.append(item)
             if len(items) < 2:
                 self._guard.doubt(stretch[0], stretch[2], REASON)
         self.trace.open += [s.as_point(s.floquet) for s in inside[1:-1] if not s.floquet.decided]
 
     def _search_here(self, old: Sample, again: Sample) -> None:
-        """Events that lie behind a point in one discretisation and before it in the next."""
-        kinds = [*self._changes(old, again), *touches(old, again)[0]]
+        """Events that lie behind a point in one discretisation and before it in the next: the way to the point is
+        searched once more in the next one, from where both agree.
+        """
         if self._watch is not None:
             self._watch.moved(old, again)
-        if not kinds:
+        if not self._differ(old, again):
             return
-        points = self.trace.points
-        reach = points[-1].arclength - points[-2].arclength if len(points) > 1 else self.settings.stepping.initial_step
-        turned = False
-        for kind in kinds:
-            if kind.name == "LP" and turned:
-                continue
-            located = locate_near(kind, again, reach)
-            item = None if located is None else self._bifurcation(located, again, again)
-            if located is not None and item is not None:
-                turned = turned or (kind is BRANCH_POINT and turns_at(located, again, again))
-                if not any(same_event(item, known) for known in self.trace.bifurcations[-4:]):
-                    self.trace.bifurcations.append(item)
-                    self._count.noted(item)
-                    continue
-            self._guard.doubt(old, again, f"{kind.name} may have happened twice within what more harmonics change")
+        way, agreed = self._way_to(again)
+        listed = [item for item in self.trace.bifurcations if item.arclength >= way[0].place]
+        found: list[Bifurcation] = []
+        for a, b in pairwise(way):
+            located, missing = self._changed_between(a, b)
+            if missing:
+                self._guard.doubt(a, b, "; ".join(_NOT_FOUND[name] for name in missing))
+            found += behind_their_grazings(located + self._grazings_between(a, b))
+        for item in found:
+            if not any(same_event(item, known) for known in listed) and self._insert(item):
+                self._count.noted(item)
+        # the others lie ahead now
+        self._ahead += [item for item in listed if not any(same_event(item, other) for other in found)]
+        if not agreed:
+            self._guard.doubt(way[0], again, _UNSEARCHED)
+
+    def _differ(self, sample: Sample, again: Sample) -> bool:
+        """Whether an event lies behind a motion in one discretisation and before it in another."""
+        return bool(self._changes(sample, again)) or self._guard.grazes(sample, again)
+
+    def _way_to(self, again: Sample) -> tuple[list[Sample], bool]:
+        """The samples of the last step in the discretisation of its end, back to where their tests agree with what they
+        were; whether they do.
+        """
+        way = [again]
+        for sample in reversed(self._passed[:-1]):
+            try:
+                there = solved_in(again.curve, sample, self.settings.newton)
+            except ConvergenceError:
+                return way, False
+            way.insert(0, there)
+            if not self._differ(sample, there):
+                return way, True
+        return way, False
 
     def _search(self, a: Sample, b: Sample) -> None:
+        # at rest the equations have a corner where a contact is closed: nothing bifurcates there
+        resting = a.at_rest or b.at_rest
+        events, missing = ([], []) if resting else self._changed_between(a, b)
+        if missing:
+            self._guard.doubt(a, b, "; ".join(_NOT_FOUND[name] for name in missing))
+        events = self._not_listed(events, a, b)
+        unseen = ["PD"] * (self._watch is not None and PERIOD_DOUBLING.changed(a, b))
+        complaint = self._count.complaint(b, [item.kind for _, item in events] + missing + unseen)
+        if complaint is not None:
+            self._guard.doubt(*complaint)
+        if not resting:
+            events += self._not_listed(self._grazings_between(a, b), a, b)
+        self.trace.bifurcations += behind_their_grazings(events)
+        if self._watch is not None and not resting:
+            for located, p, q in self._watch.passed(a, b):
+                item = self._bifurcation(located, p, q)
+                if item is None:
+                    self._guard.doubt(p, q, _NOT_FOUND["PD"])
+                else:
+                    self._insert(item)
+        crossed = (self._event(event, a, b) for event in self.settings.events)
+        self.trace.events += [item for item in crossed if item is not None]
+
+    def _changed_between(self, a: Sample, b: Sample) -> tuple[list[tuple[float, Bifurcation]], list[str]]:
+        """The bifurcations between two samples with their places, and the kinds whose tests change without one."""
         events: list[tuple[float, Bifurcation]] = []
         missing: list[str] = []
         turned: Bifurcation | None = None
-        # at rest the equations have a corner where a contact is closed: nothing bifurcates there
-        resting = a.at_rest or b.at_rest
-        for kind in () if resting else self._changes(a, b):
+        for kind in self._changes(a, b):
             if kind.name == "LP" and turned is not None:
                 self._turned = turned
                 continue
@@ -345,36 +394,26 @@ class _Follower(Driver):
         if "BP" in missing and "LP" in missing:
             # across a jump between branches the slope means nothing
             missing.remove("LP")
-        if missing:
-            self._guard.doubt(a, b, "; ".join(_NOT_FOUND[name] for name in missing))
-        unseen = ["PD"] * (self._watch is not None and PERIOD_DOUBLING.changed(a, b))
-        complaint = self._count.complaint(b, [item.kind for _, item in events] + missing + unseen)
-        if not resting and self._guard.grazes(a, b):
-            for touched in locate_grazings(a, b, self.settings.newton):
-                item = self._bifurcation(touched, a, b)
-                if item is not None:
-                    events.append((touched.fraction, item))
-        if complaint is not None:
-            self._guard.doubt(*complaint)
-        if events:
-            fresh, met = [], self.trace.bifurcations[-4:]
-            for place, item in events:
-                again = next((other for other in met if same_event(item, other)), None)
-                if again is None:
-                    fresh.append((place, item))
-                # of a hidden pair that more harmonics have shown one may lie ahead again
-                elif item.kind not in CONTACT_KINDS and again not in self._shown:
-                    self._guard.doubt(a, b, f"a second {item.kind} may lie beside that which is listed")
-            self.trace.bifurcations += behind_their_grazings(fresh)
-        if self._watch is not None and not resting:
-            for located, p, q in self._watch.passed(a, b):
-                item = self._bifurcation(located, p, q)
-                if item is None:
-                    self._guard.doubt(p, q, _NOT_FOUND["PD"])
-                else:
-                    self._insert(item)
-        crossed = (self._event(event, a, b) for event in self.settings.events)
-        self.trace.events += [item for item in crossed if item is not None]
+        return events, missing
+
+    def _grazings_between(self, a: Sample, b: Sample) -> list[tuple[float, Bifurcation]]:
+        """The grazings between two samples with their places."""
+        touched = locate_grazings(a, b, self.settings.newton) if self._guard.grazes(a, b) else []
+        items = [(located.fraction, self._bifurcation(located, a, b)) for located in touched]
+        return [(place, item) for place, item in items if item is not None]
+
+    def _not_listed(
+        self, events: list[tuple[float, Bifurcation]], a: Sample, b: Sample
+    ) -> list[tuple[float, Bifurcation]]:
+        """Those of the bifurcations between two samples that are met for the first time."""
+        fresh, met = [], self.trace.bifurcations[-4:]
+        for place, item in events:
+            known = next((other for other in met if same_event(item, other)), None)
+            if known is None:
+                fresh.append((place, item))
+            elif item.kind not in CONTACT_KINDS and known not in self._ahead:
+                self._guard.doubt(a, b, f"a second {item.kind} may lie beside that which is listed")
+        return fresh
 
     def _changes(self, a: Sample, b: Sample) -> list[BifurcationKind]:
         """The kinds to look for between two samples, as they are to be solved for."""
@@ -385,7 +424,6 @@ class _Follower(Driver):
         """Put a bifurcation into its place on the branch unless it is there already."""
         known = any(same_event(item, other) for other in self.trace.bifurcations[-4:])
         if not known:
-            self._shown.append(item)
             insort(self.trace.bifurcations, item, key=lambda other: other.arclength)
         return not known
 
