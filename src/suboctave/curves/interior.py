@@ -5,10 +5,12 @@ Two events inside one step cancel in every test at its ends. A step is therefore
 
 - the smooth functions of the tests have no zero in it that is not seen at its ends (`crossings`: interpolation through
   its ends and the samples beside it);
-- no contact begins or ceases to touch in it, or is about to just beyond it, or it is short. On the side of a grazing on
-  which the contact exists everything changes like a square root of the way to it. No polynomial through places on that
-  side foretells it, unless they lie the closer together the nearer it is: an interval is too long if an excursion
-  across a gap shrinks to less than SHRINKS of itself in it.
+- no contact begins or ceases to touch in it, or it is short. Where one does, the heights of the extrema over the gap at
+  both ends foretell where: the interval is cut close beside that place.
+
+On the side of a grazing on which the contact exists everything changes like a square root of the way to it: functions
+are interpolated over the root of the height of the excursion across the gap, where it shrinks to less than SHRINKS of
+itself in an interval.
 
 Otherwise a point is solved for where the doubt is largest, and its two halves are looked at.
 """
@@ -18,11 +20,13 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
+from itertools import pairwise
+from typing import NamedTuple
 
 from suboctave.bifurcation.gaps import GapExtrema
 from suboctave.continuation.problem import Array
 from suboctave.curves.crossings import first_doubtful
-from suboctave.curves.sample import Excursions, Sample
+from suboctave.curves.sample import Sample
 from suboctave.curves.trace import Unsettled
 from suboctave.harmonic.trigonometric import passages
 
@@ -38,11 +42,27 @@ _REMEMBERED = 64
 _LAYER = 1e-3
 #: share to which an excursion across a gap may shrink in an interval
 _SHRINKS = 0.3
-#: what an interval's contacts do: nothing, shrink towards its first or its last end, begin or cease within it
-_NOTHING, _FIRST, _LAST, _GRAZES = 0, 1, 2, 3
-#: where an interval is cut whose contacts shrink, as a fraction of it: closer to that end, towards which the intervals
-#: shorten like the excursion
-_CUT = {_FIRST: 0.35, _LAST: 0.65}
+#: how far beside the place foretold for a grazing an interval is cut, in units of _LAYER: cut on both sides it is short
+_CLEAR = 0.4
+#: shares of an interval to which a cut keeps from its ends
+_ENDS = 0.1
+#: where an interval is cut whose contacts shrink in a way that is not told by one excursion, as a fraction of it, from
+#: the end towards which they do
+_CUT = 0.35
+
+
+class Contacts(NamedTuple):
+    """What contacts do between two samples.
+
+    grazes
+        Where one begins or ceases to touch, as a fraction of the way; None if none does.
+    shrinking
+        Excursions across gaps that shrink so much that they may end just beyond one of the samples: the number of the
+        gap, instant and second derivative of the extremum, whether it is smaller at the second sample.
+    """
+
+    grazes: float | None
+    shrinking: tuple[tuple[int, float, float, bool], ...] = ()
 
 
 class Steps:
@@ -55,16 +75,14 @@ class Steps:
 
     def __init__(self) -> None:
         self._behind: list[Sample] = []
-        self._contacts: dict[tuple[Sample, Sample], int] = {}
+        self._contacts: dict[tuple[Sample, Sample], Contacts] = {}
 
     def grazes(self, p: Sample, q: Sample) -> bool:
         """Whether a contact begins or ceases to touch between two samples."""
-        return self.contacts(p, q) == _GRAZES
+        return self.contacts(p, q).grazes is not None
 
-    def contacts(self, p: Sample, q: Sample) -> int:
-        """What contacts do between two samples: an excursion across a gap may shrink so much that it may end just
-        beyond the first or the last of them.
-        """
+    def contacts(self, p: Sample, q: Sample) -> Contacts:
+        """What contacts do between two samples."""
         known = self._contacts.get((p, q))
         if known is None:
             known = self._contacts[p, q] = _contacts_between(p, q)
@@ -88,25 +106,44 @@ class Steps:
         self._behind = []
 
 
-def _contacts_between(p: Sample, q: Sample) -> int:
-    near = _NOTHING
-    for a, b, young_a, young_b in zip(p.gaps, q.gaps, p.young, q.young, strict=True):
-        _, count, crossed, other = passages(a.tau, a.value, a.curve, a.level, b.tau, b.value, b.curve, b.level)
-        if count > 0 or crossed != other:
-            return _GRAZES
-        near = near or (_FIRST if _shrinks(young_a, b) else _LAST if _shrinks(young_b, a) else _NOTHING)
-    return near
+def _contacts_between(p: Sample, q: Sample) -> Contacts:
+    shrinking: list[tuple[int, float, float, bool]] = []
+    for n, (a, b, young_a, young_b) in enumerate(zip(p.gaps, q.gaps, p.young, q.young, strict=True)):
+        pairs, count, crossed, other = passages(a.tau, a.value, a.curve, a.level, b.tau, b.value, b.curve, b.level)
+        if count > 0:
+            i, j = pairs[0].tolist()
+            before, behind = float(a.value[i]) - a.level, float(b.value[j]) - b.level
+            return Contacts(before / (before - behind))
+        if crossed != other:
+            return Contacts(0.5)
+        for young, beyond, last in ((young_a, b, False), (young_b, a, True)):
+            for tau, height, curve in young:
+                if height < _SHRINKS * _height(beyond, tau, curve):
+                    shrinking.append((n, tau, curve, last))
+    return Contacts(None, tuple(shrinking))
 
 
-def _shrinks(young: Excursions, b: GapExtrema) -> bool:
-    """Whether one of a motion's excursions across a gap is a small part of the same excursion of another."""
-    for tau, height, curve in young:
-        others = zip(b.tau.tolist(), b.value.tolist(), b.curve.tolist(), strict=True)
-        alike = [(math.cos(t - tau), v) for t, v, c in others if (c > 0.0) == (curve > 0.0)]
-        _, same = max(alike, key=lambda pair: pair[0], default=(0.0, b.level))
-        if height < _SHRINKS * (b.level - same if curve > 0.0 else same - b.level):
-            return True
-    return False
+def _height(gap: GapExtrema, tau: float, curve: float) -> float:
+    """Height across a gap of a motion's extremum of one kind nearest to an instant; 0 if there is none."""
+    others = zip(gap.tau.tolist(), gap.value.tolist(), gap.curve.tolist(), strict=True)
+    alike = [(math.cos(t - tau), v) for t, v, c in others if (c > 0.0) == (curve > 0.0)]
+    _, value = max(alike, key=lambda pair: pair[0], default=(0.0, gap.level))
+    return gap.level - value if curve > 0.0 else value - gap.level
+
+
+def _roots(stencil: Sequence[Sample], contacts: Contacts) -> list[float] | None:
+    """Square roots of the height of the excursion that shrinks, ascending along a stencil; None if no single one tells
+    the way to the grazing.
+    """
+    if len({last for *_, last in contacts.shrinking}) != 1:
+        return None
+    every = [[_height(one.gaps[n], tau, curve) for one in stencil] for n, tau, curve, _ in contacts.shrinking]
+    heights = min(every, key=min)
+    if min(heights) <= 0.0:
+        return None
+    sign = -1.0 if contacts.shrinking[0][3] else 1.0
+    roots = [sign * math.sqrt(height) for height in heights]
+    return roots if all(a < b for a, b in pairwise(roots)) else None
 
 
 class Interior(ABC):
@@ -187,16 +224,24 @@ class Interior(ABC):
     def doubt(self, p: Sample, q: Sample) -> tuple[float, str] | None:
         """Where to look into an interval, as a fraction of it, and why; None if it is done."""
         h, contacts = q.place - p.place, self.steps.contacts(p, q)
-        if contacts == _GRAZES:
-            return (0.5, "a contact begins or ceases to touch") if h > _LAYER else None
-        if contacts and h > _LAYER:
-            return _CUT[contacts], "a contact that is about to begin or cease changes everything like a square root"
+        if contacts.grazes is not None:
+            return (_beside_grazing(contacts.grazes, h), "a contact begins or ceases to touch") if h > _LAYER else None
         stencil, at = self._around(p, q)
-        if len(stencil) < 3:
-            return 0.5, "nothing was looked at"
-        places, tests = [one.place for one in stencil], [self.measures(one) for one in stencil]
-        doubt = first_doubtful(places, tests, at, lambda k: self.relative(stencil, k))
-        return None if doubt is None else (doubt[1], self.reasons[doubt[0]])
+        roots = _roots(stencil, contacts) if contacts.shrinking else None
+        if contacts.shrinking and roots is None and h > _LAYER:
+            return (1.0 - _CUT if contacts.shrinking[0][3] else _CUT), _SQUARE_ROOT
+        share, reason = 0.5, "nothing was looked at"
+        if len(stencil) > 2:
+            places, tests = roots or [one.place for one in stencil], [self.measures(one) for one in stencil]
+            doubt = first_doubtful(places, tests, at, lambda k: self.relative(stencil, k))
+            if doubt is None:
+                return None
+            share, reason = doubt[1], self.reasons[doubt[0]]
+        if roots is not None:
+            # heights, squares of these, are as far as the way is long
+            a, b = roots[at], roots[at + 1]
+            share *= (2.0 * a + share * (b - a)) / (a + b)
+        return share, reason
 
     def _around(self, p: Sample, q: Sample) -> tuple[list[Sample], int]:
         """The samples to interpolate through, up to two on either side, and the position of p among them.
@@ -242,6 +287,15 @@ class Interior(ABC):
                     break
             here = beyond
         return chosen, first
+
+
+def _beside_grazing(place: float, h: float) -> float:
+    """Where to cut an interval of length h in which a contact grazes, at a fraction of it: close beside that."""
+    share = place + math.copysign(_CLEAR * _LAYER / h, 0.5 - place)
+    return min(1.0 - _ENDS, max(_ENDS, share))
+
+
+_SQUARE_ROOT = "a contact that is about to begin or cease changes everything like a square root"
 
 
 def unsettled(p: Sample, q: Sample, reason: str) -> Unsettled:
