@@ -33,6 +33,7 @@ def branch(stable, bifurcations, events=()):
     return SimpleNamespace(
         system=SimpleNamespace(n=2, name="a system", parameters={"p": 0.0, "k": 3.0}),
         name="p",
+        shows="response",
         orbits=[orbit] * count,
         omega=np.full(count, 2.0),
         amplitude=np.ones(count),
