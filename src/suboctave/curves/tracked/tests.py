@@ -214,7 +214,7 @@ class CurvesCross(CurveTest):
         return float(sign), float(size)
 
     def smooth(self, sample: Sample) -> tuple[float, float]:
-        if isinstance(sample.curve.augmentation, NonlinearMode):
+        if isinstance(sample.curve.augmentation, NonlinearMode) or TurningPoint(sample.curve.name).stands(sample):
             return self._determinant(sample)
         # what more harmonics do to a determinant is no matter of the motion; the parameter turns where it vanishes, too
         _, size = symmetric_functions(sample.others)[:, 0].tolist()
