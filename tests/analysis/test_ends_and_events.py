@@ -147,5 +147,7 @@ def test_a_doubling_that_more_harmonics_move_is_listed_once():
     """
     system = so.library.reference_oscillator(regularization=3000.0, j=0.1771)
     for omega in ((2.12, 1.98), (2.1, 2.0), (1.98, 2.12)):
-        doublings = sorted(b.omega for b in so.frequency_response(system, omega).bifurcations["PD"])
+        curve = so.frequency_response(system, omega)
+        doublings = sorted(b.omega for b in curve.bifurcations["PD"])
         assert doublings == pytest.approx([2.02092649, 2.02261178], abs=1e-6)
+        assert not curve.audit.unsettled

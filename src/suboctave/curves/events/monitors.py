@@ -18,7 +18,6 @@ for others to say.
 from __future__ import annotations
 
 import cmath
-import math
 import weakref
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -315,24 +314,6 @@ def _solved(kind: BifurcationKind, u: Array, point: CurvePoint, sample: Sample) 
     except ConvergenceError:
         return None
     return (solution, guess.vector(solution.state)) if kind.genuine(solution, guess) else None
-
-
-def locate_near(kind: BifurcationKind, sample: Sample, reach: float) -> Located | None:
-    """A bifurcation within `reach` (scaled arclength) of a sample, on its curve: for tests that change in one place
-    because the discretisation does.
-    """
-    point = sample.point
-    solved = _solved(kind, point.u, point, sample)
-    if solved is None:
-        return None
-    solution, there = solved
-    way = point.weights * (there - point.u)
-    along = point.weights * point.tangent
-    ahead = float(way @ along) / length(along)
-    aside = math.sqrt(max(0.0, float(way @ way) - ahead**2))
-    if abs(ahead) > reach or aside > 0.1 * abs(ahead) + 1e-7:
-        return None
-    return Located(kind, 0.0, sample, solution, 0.0)
 
 
 def position(a: CurvePoint, b: CurvePoint, u: Array) -> float | None:
