@@ -193,7 +193,7 @@ class GuardedStep(Interior):
                 f"the number of unstable multipliers changes from {p.unstable} to {q.unstable}, which "
                 "no bifurcation there explains"
             )
-        if eventful and _mixed(p, q):
+        if eventful and self._mixed(p, q):
             return 0.5, "a pair of multipliers may cross the unit circle together with a real one"
         if crossing is not None and self.measures(p)[0, 0] != self.measures(q)[0, 0]:
             return 0.5, _BESIDE
@@ -202,6 +202,18 @@ class GuardedStep(Interior):
             return 0.5, "multipliers move too fast to be followed"
         # right beside a branch point at which the curve turns the multiplier at +1 is known up to its error only
         return None if doubt is not None and doubt[1] == _RETURNS and h <= _EXAMINED and self.turned else doubt
+
+    def _mixed(self, p: Sample, q: Sample) -> bool:
+        """Whether a pair that leaves the circle could be set off in the count by a real multiplier that enters it.
+
+        Its product changes sign there, and in its ring if multipliers lie in rings. Without rings it also does where
+        two real ones are each other's inverses: alone the count tells which.
+        """
+        if p.measures[0, -1] == q.measures[0, -1] or all(kind is NEIMARK_SACKER for kind in changes(p, q)):
+            return False
+        stencil, at = self._around(p, q)
+        rings = next(iter(self.relative(stencil, 3)), None) if len(stencil) > 2 else None
+        return rings is None or bool((rings[at, 0] != rings[at + 1, 0]).any())
 
     def _look_for_crossing(self, p: Sample, q: Sample) -> Crossing | None:
         """The branch point between two samples; the step is refused if the orientation changes without one, which it
@@ -219,7 +231,7 @@ class GuardedStep(Interior):
         return known
 
     def relative(self, stencil: Sequence[Sample], k: int) -> Iterator[Array]:
-        """See `Interior.relative`: with the functions of multipliers in rings, and of those that elements move."""
+        """See `Interior.relative`: with the functions of multipliers in rings, then of those that elements move."""
         known = [s.floquet.multipliers for s in stencil]
         if self.turned or k == 0 or len({len(mu) for mu in known}) > 1 or not np.isfinite(known).all():
             return
@@ -276,14 +288,6 @@ def _explained(p: Sample, q: Sample) -> bool:
         return change <= 2 + ("PD" in changed) + 2 * ("NS" in changed)
     single = len(changed & {"LP", "BP", "PD"})
     return change <= single + 2 * ("NS" in changed) and (change - single) % 2 == 0
-
-
-def _mixed(p: Sample, q: Sample) -> bool:
-    """Whether a pair that leaves the circle could be set off in the count by a real multiplier that enters it.
-
-    Its product changes sign there (and where two real ones are each other's inverses): alone the count tells which.
-    """
-    return p.measures[0, -1] != q.measures[0, -1] and any(kind is not NEIMARK_SACKER for kind in changes(p, q))
 
 
 @kernel()

@@ -11,8 +11,12 @@ sqrt(1 + |mu|^2), that keeps large multipliers from drowning the rest.
 
 A structure has many multipliers, and the product of all factors changes as fast as all of them together. But moduli
 change slowly however fast the multipliers turn: where neighbouring motions have theirs in separate rings around the
-origin, the symmetric functions of each ring, and the products of `1 - mu_i mu_j` between every two, are as smooth, and
-simpler (`in_rings`). Real multipliers share one ring, whose factors alone change sign together with others.
+origin, the symmetric functions of each ring are as smooth, and simpler (`in_rings`).
+
+- Of fold and double all real multipliers share one ring, whose factors alone change sign together with others.
+- A pair that leaves the circle is one of conjugates, of equal modulus and thus of one ring. The factors of torus
+  between two rings vanish where their multipliers are each other's inverses, neutral saddles: they are left out. In
+  their place stand, between rings with real multipliers, which become a pair where they meet, those of 1 - mu_i / mu_j.
 """
 
 from __future__ import annotations
@@ -45,8 +49,9 @@ def symmetric_functions(mu: ComplexArray) -> Array:
 
 @kernel()
 def multiply(mu, k, column, out):
-    """fold, double or torus (k = 0, 1, 2) of multipliers (m,) into the columns of (2, C): `column` (m, m) says into
-    which the factor of i and j < i goes, at [i, 0] for fold and double; one that is negative is left out.
+    """fold, double, torus or the product of all `1 - mu_i / mu_j` (k = 0, 1, 2, 3) of multipliers (m,) into the columns
+    of (2, C): `column` (m, m) says into which the factor of i and j < i goes, at [i, 0] for fold and double; one that
+    is negative is left out.
     """
     m, total = mu.shape[0], 0.0
     for i in range(m if k == 2 else 0):
@@ -54,12 +59,14 @@ def multiply(mu, k, column, out):
     product = np.ones(out.shape[1])
     for c in range(out.shape[1]):
         out[0, c], out[1, c] = 1.0, 0.0
-    for i in range(m if k < 2 or abs(total) >= UNDAMPED else 0):
-        for j in range(i if k == 2 else 1):
+    for i in range(m if k != 2 or abs(total) >= UNDAMPED else 0):
+        for j in range(i if k > 1 else 1):
             c = column[i, j]
             if c < 0:
                 continue
-            of = mu[i] * mu[j] if k == 2 else mu[i]
+            of = mu[i]
+            if k > 1:
+                of = mu[i] * mu[j] if k == 2 else mu[i] / mu[j]
             real, size = (1.0 + of.real if k == 1 else 1.0 - of.real), of.real**2 + of.imag**2
             if real < 0.0 and of.imag**2 <= 1e-24 * size:
                 out[0, c] = -out[0, c]
@@ -76,38 +83,49 @@ def multiply(mu, k, column, out):
 @kernel()
 def in_rings(mu, k):
     """fold, double or torus (k = 0, 1, 2) of neighbouring motions with multipliers (N, m), by descending modulus, as
-    the product of functions (N, 2, C) of fewer multipliers each.
+    functions (N, 2, C) of fewer multipliers each: one or the other vanishes where an event is.
     """
     motions, m = mu.shape
     lowest, highest = np.full(m, np.inf), np.zeros(m)
     for q in range(motions):
         for i in range(m):
             lowest[i], highest[i] = min(lowest[i], abs(mu[q, i])), max(highest[i], abs(mu[q, i]))
+    # of fold and double the first ring is that of all real ones
     ring, reach, rings, first = np.zeros(m, dtype=np.int64), np.zeros(m + 1), 1, 0
+    with_real = np.zeros(m + 1, dtype=np.bool_)
     for i in range(m):
         if i + 1 < m:
             moved = max(highest[i] - lowest[i], highest[i + 1] - lowest[i + 1])
             if not lowest[i] - highest[i + 1] > moved:
                 continue
-        complex_ones = True
+        real = False
         for q in range(motions):
             for j in range(first, i + 1):
-                complex_ones = complex_ones and mu[q, j].imag != 0.0
-        at = rings if complex_ones else 0
+                real = real or mu[q, j].imag == 0.0
+        at = 0 if real and k < 2 else rings
+        with_real[at] = real
         for j in range(first, i + 1):
             ring[j], reach[at] = at, max(reach[at], highest[j])
         rings, first = max(rings, at + 1), i + 1
-    number, count = np.full((rings, rings), -1), 0
+    number, own = np.full((rings, rings), -1), 0
     for a in range(rings):
-        for b in range(a + 1 if k == 2 else 1):
-            if reach[a] * (reach[b] if k == 2 else 1.0) > _INSIDE:
-                number[a, b], count = count, count + 1
-    column = np.empty((m, m), dtype=np.int64)
+        if reach[a] ** (2 if k == 2 else 1) > _INSIDE:
+            number[a, a], own = own, own + 1
+    count = own
+    for a in range(rings if k == 2 else 0):
+        for b in range(a):
+            if with_real[a] and with_real[b] and reach[a] * reach[b] > _INSIDE:
+                number[a, b], count = count - own, count + 1
+    inner, between = np.full((m, m), -1), np.full((m, m), -1)
     for i in range(m):
         for j in range(m):
-            a, b = (max(ring[i], ring[j]), min(ring[i], ring[j])) if k == 2 else (ring[i], 0)
-            column[i, j] = number[a, b]
+            if k < 2 or ring[i] == ring[j]:
+                inner[i, j] = number[ring[i], ring[i]]
+            else:
+                between[i, j] = number[ring[i], ring[j]]
     out = np.empty((motions, 2, count))
     for q in range(motions):
-        multiply(mu[q], k, column, out[q])
+        multiply(mu[q], k, inner, out[q, :, :own])
+        if count > own:
+            multiply(mu[q], 3, between, out[q, :, own:])
     return out
