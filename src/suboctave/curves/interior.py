@@ -23,6 +23,8 @@ from collections.abc import Iterable, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
+import numpy as np
+
 from suboctave.bifurcation.gaps import GapExtrema
 from suboctave.continuation.problem import Array
 from suboctave.curves.crossings import first_doubtful
@@ -116,19 +118,27 @@ def _contacts_between(p: Sample, q: Sample) -> Contacts:
             return Contacts(before / (before - behind))
         if crossed != other:
             return Contacts(0.5)
-        for young, beyond, last in ((young_a, b, False), (young_b, a, True)):
-            for tau, height, curve in young:
-                if height < _SHRINKS * _height(beyond, tau, curve):
-                    shrinking.append((n, tau, curve, last))
+        if not (young_a or young_b):
+            continue
+        # one without its like has merged with a neighbour on its own side of the gap, which is no grazing
+        for i, j in pairs.tolist():
+            if young_a.get(i, math.inf) < _SHRINKS * _over(b, j):
+                shrinking.append((n, float(a.tau[i]), float(a.curve[i]), False))
+            if young_b.get(j, math.inf) < _SHRINKS * _over(a, i):
+                shrinking.append((n, float(b.tau[j]), float(b.curve[j]), True))
     return Contacts(None, tuple(shrinking))
+
+
+def _over(gap: GapExtrema, which: int) -> float:
+    """Height of one of a motion's extrema across a gap."""
+    height = float(gap.value[which]) - gap.level
+    return -height if gap.curve[which] > 0.0 else height
 
 
 def _height(gap: GapExtrema, tau: float, curve: float) -> float:
     """Height across a gap of a motion's extremum of one kind nearest to an instant; 0 if there is none."""
-    others = zip(gap.tau.tolist(), gap.value.tolist(), gap.curve.tolist(), strict=True)
-    alike = [(math.cos(t - tau), v) for t, v, c in others if (c > 0.0) == (curve > 0.0)]
-    _, value = max(alike, key=lambda pair: pair[0], default=(0.0, gap.level))
-    return gap.level - value if curve > 0.0 else value - gap.level
+    alike = np.flatnonzero((gap.curve > 0.0) == (curve > 0.0))
+    return _over(gap, int(alike[np.argmax(np.cos(gap.tau[alike] - tau))])) if alike.size else 0.0
 
 
 def _roots(stencil: Sequence[Sample], contacts: Contacts) -> list[float] | None:

@@ -37,8 +37,8 @@ from suboctave.harmonic.perturbation import Kind
 from suboctave.lazy import lazy
 
 _MONODROMY = Monodromy()
-#: excursions across a gap: instant and height of an extremum, and its second derivative by tau
-Excursions = list[tuple[float, float, float]]
+#: excursions across a gap: heights of its extrema, by their number
+Excursions = dict[int, float]
 #: height, in units of the largest relative displacement, up to which an excursion may end soon
 _YOUNG = 0.05
 #: coefficient of a double multiplier, in units of omega, below which rounding has its say (an undamped structure)
@@ -133,9 +133,9 @@ class Sample:
         for gap in self.gaps:
             values, level = gap.value.tolist(), gap.level
             most = _YOUNG * max(map(abs, values), default=0.0)
-            turns = zip(gap.tau.tolist(), values, gap.curve.tolist(), strict=True)
-            heights = [(tau, level - value if curve > 0.0 else value - level, curve) for tau, value, curve in turns]
-            found.append([item for item in heights if 0.0 < item[1] < most])
+            turns = enumerate(zip(values, gap.curve.tolist(), strict=True))
+            heights = ((i, level - value if curve > 0.0 else value - level) for i, (value, curve) in turns)
+            found.append({i: height for i, height in heights if 0.0 < height < most})
         return found
 
     @lazy

@@ -326,8 +326,8 @@ def passages(ta, xa, sa, level_a, tb, xb, sb, level_b):
     """Extrema that pass a level between two neighbouring motions a and b (instants t, values x, curvatures s).
 
     Extrema are paired in their cyclic order, so that two that pass at once in opposite senses are both seen. Returns
-    pairs of indices, shape (m, 2), the number m of them that count, and how often each motion crosses its level. If the
-    crossings differ by other than what the pairs explain, extrema have come or gone as well.
+    all pairs of indices, those that pass first, shape (m, 2), how many do, and how often each motion crosses its level.
+    If the crossings differ by other than what the pairs explain, extrema have come or gone as well.
     """
     crossed_a = crossed_b = 0
     for i in range(xa.shape[0]):
@@ -373,11 +373,16 @@ def passages(ta, xa, sa, level_a, tb, xb, sb, level_b):
         if total < least:
             least = total
             best = shift
+    last = wanted
     for i in range(wanted):
         p = ia[i]
         q = ib[(i + best) % wanted]
         if (xa[p] > level_a) != (xb[q] > level_b):
-            pairs[count, 0] = p
-            pairs[count, 1] = q
+            at = count
             count += 1
+        else:
+            last -= 1
+            at = last
+        pairs[at, 0] = p
+        pairs[at, 1] = q
     return pairs, count, crossed_a, crossed_b
