@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import re
-from pathlib import Path
-
 import numpy as np
 import pytest
+from pages import blocks, check_prints
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, fsolve
 from scipy.special import ellipk
@@ -15,12 +13,10 @@ import suboctave as so
 from suboctave.study.file import read_study
 from suboctave.study.runner import run_study
 
-PAGE = (Path(__file__).parents[2] / "docs" / "nonlinear_modes.md").read_text(encoding="utf-8")
 TIGHT = {
     "harmonics": so.AdaptiveHarmonics(tolerance=1e-12, event_tolerance=1e-12),
     "newton": so.NewtonOptions(tolerance=1e-12),
 }
-NUMBER = r"-?\d+\.?\d*(?:e[+-]\d+)?"
 STIFFNESS = np.array([[2.0, -1.0], [-1.0, 2.0]])
 
 
@@ -283,7 +279,7 @@ def test_read_like_a_response(lower, tmp_path):
 
 
 def test_the_study_of_the_page(tmp_path):
-    (analyses,) = re.findall(r"^```toml\n(.*?)^```", PAGE, re.M | re.S)
+    (analyses,) = blocks("nonlinear_modes.md", "toml")
     equations = "x'' + 2*x - y + 0.5*x**3 = 0", "y'' + 2*y - x = 0"
     path = tmp_path / "study.toml"
     path.write_text(f"[system]\nequations = {list(equations)}\n\n{analyses}", encoding="utf-8")
@@ -342,14 +338,7 @@ def test_what_a_mode_is_not_good_for(lower):
 
 def test_the_page_says_what_it_prints(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    codes, texts = (re.findall(rf"^```{kind}\n(.*?)^```", PAGE, re.M | re.S) for kind in ("python", "text"))
-    scope: dict = {}
-    for code, text in zip(codes, texts, strict=True):
-        exec(compile(code, "docs/nonlinear_modes.md", "exec"), scope)
-        printed = capsys.readouterr().out
-        assert re.sub(NUMBER, "", printed).split() == re.sub(NUMBER, "", text).split()
-        ours, theirs = (np.array([float(one) for one in re.findall(NUMBER, part)]) for part in (printed, text))
-        np.testing.assert_allclose(ours, theirs, rtol=1e-3, atol=1e-6)
+    check_prints("nonlinear_modes.md", capsys)
 
 
 def test_motions_of_modes_against_shooting(tmp_path):

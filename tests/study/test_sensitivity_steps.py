@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import re
-from pathlib import Path
-
 import pytest
+from pages import blocks
 
 import suboctave as so
 
-PAGE = (Path(__file__).parents[2] / "docs" / "sensitivity.md").read_text(encoding="utf-8")
-(ANALYSES,) = re.findall(r"^```toml\n(.*?)^```", PAGE, re.M | re.S)
+(ANALYSES,) = blocks("sensitivity.md", "toml")
 SYSTEM = '[system]\nlibrary = "reference_oscillator"\narguments = { p = 0.55, j = 0.5 }\n\n'
 STUDY = SYSTEM + ANALYSES.replace("bounds = [0.0, 1.0]", "bounds = [0.0, 1.0]\nvalues = 2\nharmonics = 15")
 

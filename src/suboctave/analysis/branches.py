@@ -25,7 +25,7 @@ from suboctave.curves.events.locate import Singular
 from suboctave.curves.follow import both_ways, follow, same_event
 from suboctave.curves.junction import UNSEEN, beside, curvature_of, emanating, period_name
 from suboctave.curves.motion import MotionProblem
-from suboctave.curves.starts import Harmonics, harmonics_of, own_linear_part, start_point
+from suboctave.curves.starts import Harmonics, harmonics_of, linear_up_to, own_linear_part, start_point
 from suboctave.curves.trace import BranchPoint, Settings, Trace
 from suboctave.errors import ConvergenceError, InputError, is_number
 from suboctave.harmonic.linear_part import LinearPart
@@ -227,6 +227,8 @@ def from_end(curve: MotionProblem, start: Any, run: CurveRun, call: str) -> Trac
 
 #: share by which forces must deviate from linear ones for a motion to count as nonlinear
 _NOTICED = 0.01
+#: size of a motion, in units of a direction, that is taken for the natural one where all forces are linear
+_LARGEST = 1e12
 
 _NO_OTHER = {
     "LP": "at a limit point the branch only turns back, and nothing leaves it",
@@ -393,11 +395,8 @@ def _scale_from_rest(curve: MotionProblem, u: Array, direction: Array) -> None:
         frequency, parameters = at_values(values, curve.name, aside, omega)
         linear = max(linear, length(balance.at(x, frequency, parameters).jacobian @ phi))
     unit = curve.size(curve.join(change, 0.0))
-    for size in np.geomspace(1e-12, 1e12, 145):
-        bent = balance.at(x + size * change, omega, values).force - rest.force
-        if not np.isfinite(bent).all() or length(bent.ravel() / size - slope) > _NOTICED * linear:
-            break
-    curve.reference = 100.0 * float(size) * unit
+    _, size = linear_up_to(rest, change, _NOTICED * linear)
+    curve.reference = 100.0 * min(size, _LARGEST) * unit
 
 
 def _distance(point: CurvePoint, u: Array, curve: MotionProblem) -> float:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any, Unpack
-
-import numpy as np
 
 from suboctave.analysis.equilibria import check_undriven
 from suboctave.analysis.options import Inherited, TrackOptions
@@ -15,7 +14,7 @@ from suboctave.continuation.linear import length
 from suboctave.continuation.newton import NewtonOptions, correct
 from suboctave.curves.hopf import shape_of
 from suboctave.curves.motion import MotionEvaluation
-from suboctave.curves.starts import own_linear_part, rule_of
+from suboctave.curves.starts import linear_up_to, own_linear_part, rule_of
 from suboctave.curves.trace import BranchPoint
 from suboctave.curves.tracked.start import curve_through
 from suboctave.errors import ConvergenceError, InputError
@@ -171,15 +170,9 @@ def _noticed(state: BalanceState, shape: Array, name: str, aside: float) -> floa
     """The size from which on an oscillation about an equilibrium is nonlinear, at a parameter or a little beside."""
     sizes = []
     for value in (state.values[name], state.values[name] + aside, state.values[name] - aside):
-        at = {**state.values, name: value}
-        rest = state.balance.at(state.x, state.omega, at)
-        slope = rest.force_jacobian @ shape.ravel()
-        linear = length(rest.linear_jacobian @ shape.ravel()) + length(slope)
-        for size in np.geomspace(1e-12, 1e12, 145):
-            bent = state.balance.at(state.x + size * shape, state.omega, at).force - rest.force
-            if not np.isfinite(bent).all() or length(bent.ravel() / size - slope) > _NOTICED * linear:
-                sizes.append(float(size))
-                break
-    if not sizes:
+        rest = state.balance.at(state.x, state.omega, {**state.values, name: value})
+        linear = length(rest.linear_jacobian @ shape.ravel()) + length(rest.force_jacobian @ shape.ravel())
+        sizes.append(linear_up_to(rest, shape, _NOTICED * linear)[1])
+    if not math.isfinite(min(sizes)):
         raise ConvergenceError("the system is linear: oscillations of any size begin at this Hopf point")
     return min(sizes)

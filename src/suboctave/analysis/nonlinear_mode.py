@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from bisect import bisect_left
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -18,7 +17,7 @@ from suboctave.continuation.linear import length, one_thread
 from suboctave.curves.kinds.nonlinear_mode import NonlinearMode
 from suboctave.curves.measures import MEASURES, bounded
 from suboctave.curves.motion import MotionProblem
-from suboctave.curves.starts import Harmonics, make_curve, settled
+from suboctave.curves.starts import Harmonics, linear_up_to, make_curve, settled
 from suboctave.curves.trace import Settings
 from suboctave.curves.tracked.follow import follow_tracked
 from suboctave.errors import ConvergenceError, InputError, is_number, shortened
@@ -38,8 +37,8 @@ from suboctave.structures.frequencies import natural_frequencies
 _LINEAR = 1e-4
 #: share of the largest amplitude at which a mode begins that is linear
 _FIRST = 1e-3
-#: sizes of motions of unit modal mass at which forces are compared with linear ones
-_SIZES = np.geomspace(1e-12, 1e12, 289).tolist()
+#: the smallest and the largest motion that is thought of, in units of that of unit modal mass
+_SIZES = (1e-12, 1e12)
 #: share of a bound by which a start may miss it
 _ON_IT = 1e-9
 #: how often an interval of sizes, in powers, is halved
@@ -215,18 +214,11 @@ class _LinearMode:
     def linear_up_to(self) -> float:
         """The largest size at which forces are linear but for a small share, infinite where they are at all sizes."""
         rest, one = self.state(0.0), self.state(1.0)
-        change = (one.x - rest.x).ravel()
-        slope = rest.force_jacobian @ change
+        change = one.x - rest.x
         # of the forces of inertia, omega^2 M x
-        momentum = apply_blocks(one.linear.feeding(one.frequencies), one.x - rest.x)
-        allowed = _LINEAR * self.omega * length(momentum)
-
-        def bent(size: float) -> bool:
-            force = self.state(size).force - rest.force
-            return not np.isfinite(force).all() or length(force.ravel() / size - slope) > allowed
-
-        at = bisect_left(_SIZES, True, key=bent)
-        return math.inf if at == len(_SIZES) else _SIZES[at - 1] if at else 0.0
+        momentum = apply_blocks(one.linear.feeding(one.frequencies), change)
+        below, beyond = linear_up_to(rest, change, _LINEAR * self.omega * length(momentum))
+        return below if math.isfinite(beyond) else math.inf
 
 
 def _linear_mode(
@@ -285,7 +277,7 @@ def _started(linear: _LinearMode, conservative: bool, ranges: Mapping[str, Range
 
 def _size_at(linear: _LinearMode, name: str, value: float, observe: int) -> float:
     """About the size of a linear motion at which a measure has a value, 0 where it is larger at once."""
-    low, high = (math.log(size) for size in (_SIZES[0], _SIZES[-1]))
+    low, high = (math.log(size) for size in _SIZES)
     if not value > 0.0:
         return 0.0
     with np.errstate(over="ignore", invalid="ignore"):

@@ -123,13 +123,16 @@ def switch_tracked(
     adaptive = rule if isinstance(rule, AdaptiveHarmonics) else None
     if isinstance(rule, int):
         basis = HarmonicBasis(rule * basis.nu, basis.nu)
-    departing = _doubled if item.kind == "PD" else _crossing
+    doubled = item.kind == "PD"
     title = f"{KINDS[item.curve].words} that leaves a {KINDS[item.kind].words}"
     with one_thread(), reporting(options.get("progress"), title) as report:
         settings = settings.reporting_to(report, ranges.get(name, (0.0, item.parameter(name))), "event")
-        leaving = departing(item, basis, ranges, adaptive, settings)
-        check_unknowns(orbit.balance.size, leaving.curve.balance.basis)
-        half = item.kind == "PD" or side is not None
+        basis = basis.doubled if doubled else basis
+        check_unknowns(orbit.balance.size, basis)
+        curve, u = curve_through(replace(item, kind=item.curve), basis, item.names, ranges, adaptive)
+        direction = (_doubled if doubled else _crossing)(item, curve, u)
+        leaving = _Departure(item, curve, u, direction, ranges, settings)
+        half = doubled or side is not None
         trace = leaving.half(float(side or 1)) if half else leaving.whole()
     own = {name: known.known[name] for name in ("onto", "damped", "mode") if name in known.known}
     kept = {**options_of(settings, wanted, given), **own}
@@ -142,17 +145,11 @@ def switch_tracked(
     )  # fmt: skip
 
 
-def _crossing(
-    item: TrackedEvent,
-    basis: HarmonicBasis,
-    ranges: Mapping[str, Range],
-    adaptive: AdaptiveHarmonics | None,
-    settings: Settings,
-) -> _Departure:
-    """The other curve at a branch point; +1 is the side on which the last parameter grows, or where it hardly moves,
-    the largest coefficient.
+def _crossing(item: TrackedEvent, curve: MotionProblem, u: Array) -> Array:
+    """The direction of the other curve at a branch point; +1 is the side on which the last parameter grows, or where it
+    hardly moves, the largest coefficient.
     """
-    curve, u = curve_through(replace(item, kind=item.curve), basis, item.names, ranges, adaptive)
+    basis = curve.balance.basis
     weights = curve.weights(u, 0.0)
     if item.tangent is None:
         raise InputError("this branch point does not know the direction of its curve: locate it again")
@@ -162,23 +159,15 @@ def _crossing(
     direction = other_direction(curve, u, weights, tangent)
     scaled = weights * direction
     leading = scaled[-1] if abs(scaled[-1]) > 1e-3 else scaled[int(np.argmax(np.abs(scaled[:-1])))]
-    return _Departure(item, curve, u, math.copysign(1.0, leading) * direction, ranges, settings)
+    return math.copysign(1.0, leading) * direction
 
 
-def _doubled(
-    item: TrackedEvent,
-    basis: HarmonicBasis,
-    ranges: Mapping[str, Range],
-    adaptive: AdaptiveHarmonics | None,
-    settings: Settings,
-) -> _Departure:
-    """The motions of twice the period at a period doubling."""
+def _doubled(item: TrackedEvent, curve: MotionProblem, u: Array) -> Array:
+    """The direction of the motions of twice the period at a period doubling."""
     state = item.orbit.state()
     vectors = item.null_vectors or null_vectors(state, Kind.HALF)
-    curve, u = curve_through(replace(item, kind=item.curve), basis.doubled, item.names, ranges, adaptive)
     size = curve.balance.size
     weighted = vectors.right * state.balance.row_weights(len(vectors.right))
     phi = doubled_direction(weighted, size, curve.balance.basis)
     direction = curve.join(phi, 0.0, np.zeros(curve.augmentation.extras))
-    direction /= length(curve.weights(u, 0.0) * direction)
-    return _Departure(item, curve, u, direction, ranges, settings)
+    return direction / length(curve.weights(u, 0.0) * direction)

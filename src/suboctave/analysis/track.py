@@ -80,10 +80,11 @@ def track(
     Parameters
     ----------
     bifurcation
-        A located LP, BP, PD, NS or grazing of any branch (of motions of one or several load periods); one of the
-        `extrema` of a tracked curve; or one of its points of codimension two through which another curve passes, or
-        from which one begins (GPD, R1, R2, LPPD, LPNS, PDNS, NSNS). With `onto` a kind of motions also a user's event
-        or a point of a branch, one of its `points`, beside the curve.
+        A located LP, BP, PD, NS or grazing of any branch (of motions of one or several load periods); a Hopf point of
+        equilibria; an LP, PD or NS of limit cycles; one of the `extrema` of a tracked curve; or one of its points of
+        codimension two through which another curve passes, or from which one begins (GPD, R1, R2, LPPD, LPNS, PDNS,
+        NSNS). With `onto` a kind of motions also a user's event or a point of a branch, one of its `points`, beside the
+        curve.
     parameter
         The second parameter, omega being the first; or two names, with omega kept. Of an extremum the third one.
     bounds

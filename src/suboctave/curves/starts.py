@@ -14,6 +14,7 @@ chapter 11). Damping and restoring forces bound it, linear stiffness or not, con
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -45,6 +46,9 @@ from suboctave.timedomain import integrate
 _EXPECTED = 15
 #: unknowns of a dense problem beyond which a run is refused (a matrix of half a gigabyte)
 _DENSE_UNKNOWNS = 8000
+
+#: sizes of a change of a motion at which forces are compared with linear ones
+_SIZES = np.geomspace(1e-12, 1e12, 145).tolist()
 
 Harmonics = int | str | AdaptiveHarmonics
 
@@ -187,6 +191,23 @@ def start_point(curve: MotionProblem, value: float, given: Any, newton: NewtonOp
         f"no motion found to start from at {curve.where(linear)}{loose or ''}. Tried: " + "; ".join(tried) + ". "
         "Start elsewhere in the range, or give start= (an orbit, or a state near the motion)"
     )
+
+
+def linear_up_to(rest: BalanceState, change: Array, allowed: float) -> tuple[float, float]:
+    """Sizes of a change of a motion, neighbours on a scale of powers: up to the first one forces are linear, from the
+    second on they deviate from that by more than `allowed` times the size. Zero where they do at all sizes, infinite at
+    none.
+
+    `change`: coefficients (2 H + 1, size) of size one; `allowed`: norm of a force.
+    """
+    slope = rest.force_jacobian @ change.ravel()
+
+    def bent(size: float) -> bool:
+        force = rest.balance.at(rest.x + size * change, rest.omega, rest.values).force - rest.force
+        return not np.isfinite(force).all() or length(force.ravel() / size - slope) > allowed
+
+    at = bisect_left(_SIZES, True, key=bent)
+    return _SIZES[at - 1] if at else 0.0, _SIZES[at] if at < len(_SIZES) else math.inf
 
 
 def _unheld(curve: MotionProblem, u: Array) -> str | None:

@@ -327,14 +327,15 @@ class Branch(CurveTables, BranchReadings):
 
 # ----------------------------------------------------------------------------------------------- curves of bifurcations
 class TrackedBranch(Branch):
-    """Bifurcations of one kind in two free parameters, in order; read like a `Branch`.
+    """Bifurcations of one kind in two parameters, or motions singled out otherwise, in order; read like a `Branch`.
 
     Attributes
     ----------
     kind
-        "LP", "BP", "PD", "NS" or "grazing".
+        "LP", "BP", "PD", "NS", "Hopf" or "grazing"; "phase_resonance", "ridge", "limit_cycle", ... of motions.
     names
-        The two free parameters; `name` is the second. Three of a curve of extrema; `name` is the third.
+        The two free parameters; `name` is the last. Three of a curve of extrema and of bifurcations of limit cycles,
+        whose omega is free; omega alone of a nonlinear mode.
     turning
         The one of them that is extreme all along a curve of extrema; else empty.
     bifurcations

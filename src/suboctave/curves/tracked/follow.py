@@ -30,7 +30,7 @@ from suboctave.curves.tracked.ends import (
 )
 from suboctave.curves.tracked.events import LocatedEvent, StepWatch, as_event, events_between, located, refined
 from suboctave.curves.tracked.start import Ranges
-from suboctave.curves.tracked.tests import CurvesCross, Extremum, tests_of
+from suboctave.curves.tracked.tests import CurvesCross, Extremum, stands, tests_of
 from suboctave.errors import ConvergenceError
 
 #: range of a parameter that is not bounded
@@ -212,7 +212,7 @@ class _Tracker(Driver):
         curve, first = sample.curve, self.home
         if not curve.augmentation.free_phase or curve.size(sample.point.u) < _GROWN * first.curve.size(first.u):
             return False
-        return all(test.stands(sample) for test in self.tests if isinstance(test, Extremum))
+        return all(stands(sample, name) for name in curve.names)
 
     def _take(self, events: list[LocatedEvent]) -> None:
         settings, warnings = self.settings, self.trace.warnings

@@ -127,17 +127,20 @@ class Extremum(CurveTest):
         return "maximum" if rising > 0.0 else "minimum"
 
     def changed(self, a: Sample, b: Sample) -> bool:
-        return not (self.stands(a) and self.stands(b)) and super().changed(a, b)
+        return not (stands(a, self.name) and stands(b, self.name)) and super().changed(a, b)
 
     def smooth(self, sample: Sample) -> tuple[float, float]:
         # at a cusp it vanishes as well; the same all along a parameter that stays as it is
+        if stands(sample, self.name):
+            return 1.0, _logarithm(_LEVEL)
         slope = sample.slopes[self.name]
-        return (1.0, _logarithm(_LEVEL)) if self.stands(sample) else (math.copysign(1.0, slope), _logarithm(slope))
+        return math.copysign(1.0, slope), _logarithm(slope)
 
-    def stands(self, sample: Sample) -> bool:
-        """Whether the parameter stays as it is but for rounding."""
-        weight = float(sample.point.weights[sample.curve.index(self.name)])
-        return abs(sample.slopes[self.name] * weight) < _LEVEL
+
+def stands(sample: Sample, name: str) -> bool:
+    """Whether a parameter stays as it is along the curve but for rounding."""
+    weight = float(sample.point.weights[sample.curve.index(name)])
+    return abs(sample.slopes[name] * weight) < _LEVEL
 
 
 @dataclass(frozen=True)
@@ -214,7 +217,7 @@ class CurvesCross(CurveTest):
         return float(sign), float(size)
 
     def smooth(self, sample: Sample) -> tuple[float, float]:
-        if isinstance(sample.curve.augmentation, NonlinearMode) or TurningPoint(sample.curve.name).stands(sample):
+        if isinstance(sample.curve.augmentation, NonlinearMode) or stands(sample, sample.curve.name):
             return self._determinant(sample)
         # what more harmonics do to a determinant is no matter of the motion; the parameter turns where it vanishes, too
         _, size = symmetric_functions(sample.others)[:, 0].tolist()

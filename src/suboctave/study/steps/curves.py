@@ -97,6 +97,21 @@ class FollowingStep(Step):
             yield ("harmonics",), f"with forces along {size} DOFs that is too many unknowns: keep fewer harmonics"
 
 
+class AlongParameter(FollowingStep):
+    """Follows motions along one parameter over its range."""
+
+    parameter: str
+    bounds: Range
+
+    @property
+    def varied(self) -> tuple[str, ...]:
+        return (self.parameter,)
+
+    def check(self, around: CheckContext) -> Iterator[Complaint]:
+        yield from super().check(around)
+        yield from check_varied(around, self.parameter, self.bounds)
+
+
 class CurveStep(FollowingStep, gives="branch"):
     """The arguments that `frequency_response` and `continue_branch` share."""
 
@@ -195,20 +210,13 @@ class Mode(FollowingStep, kind="nonlinear_mode", verb=nonlinear_mode, gives="bra
         yield from tried("damped", lambda: free_system(around.system, self.damped))
 
 
-class ContinueBranch(CurveStep, kind="continue_branch", verb=continue_branch):
+class ContinueBranch(CurveStep, AlongParameter, kind="continue_branch", verb=continue_branch):
     """`so.continue_branch` from a motion of an earlier branch, or from the system with `omega`."""
 
-    parameter: str
-    bounds: Range
     omega: float | None = None
-
-    @property
-    def varied(self) -> tuple[str, ...]:
-        return (self.parameter,)
 
     def check(self, around: CheckContext) -> Iterator[Complaint]:
         yield from super().check(around)
-        yield from check_varied(around, self.parameter, self.bounds)
         if self.start is not None and self.motion is None:
             yield ("start",), "name a motion of an earlier analysis, or leave it out and give omega"
         if self.start is None and self.parameter != "omega":

@@ -9,24 +9,17 @@ from suboctave.analysis.limit_cycles import limit_cycles
 from suboctave.model.inputs import check_range
 from suboctave.study.results import Result
 from suboctave.study.steps.base import CheckContext, Complaint, Context, Known, Motion, Range, check_varied, tried
-from suboctave.study.steps.curves import CurveStep, FollowingStep
+from suboctave.study.steps.curves import AlongParameter, CurveStep
 
 
-class EquilibriaStep(FollowingStep, kind="equilibria", verb=equilibria, gives="branch"):
+class EquilibriaStep(AlongParameter, kind="equilibria", verb=equilibria, gives="branch"):
     """`so.equilibria`; `start` has the displacements that are meant at the first value."""
 
-    parameter: str
-    bounds: Range
     start: list[float] | None = None
     highest: float | None = None
 
-    @property
-    def varied(self) -> tuple[str, ...]:
-        return (self.parameter,)
-
     def check(self, around: CheckContext) -> Iterator[Complaint]:
         yield from super().check(around)
-        yield from check_varied(around, self.parameter, self.bounds)
         yield from tried("", lambda: check_undriven(around.system))
         if self.harmonics is not None:
             yield ("harmonics",), "equilibria have none: leave it out"

@@ -1,0 +1,27 @@
+"""Pages of docs/ print what they say: their blocks of code are run one after the other."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+DOCS = Path(__file__).parents[2] / "docs"
+_NUMBER = r"-?\d+\.?\d*(?:e[+-]\d+)?"
+
+
+def blocks(page: str, kind: str) -> list[str]:
+    """The fenced blocks of a kind ("python", "text", "toml") of a page."""
+    return re.findall(rf"^```{kind}\n(.*?)^```", (DOCS / page).read_text(encoding="utf-8"), re.M | re.S)
+
+
+def check_prints(page: str, capsys) -> None:
+    """Run the code of a page; what each block prints is the text behind it, numbers to a thousandth."""
+    scope: dict = {}
+    for code, text in zip(blocks(page, "python"), blocks(page, "text"), strict=True):
+        exec(compile(code, f"docs/{page}", "exec"), scope)
+        printed = capsys.readouterr().out
+        assert re.sub(_NUMBER, "", printed).split() == re.sub(_NUMBER, "", text).split()
+        ours, theirs = (np.array([float(one) for one in re.findall(_NUMBER, part)]) for part in (printed, text))
+        np.testing.assert_allclose(ours, theirs, rtol=1e-3, atol=1e-6)
