@@ -5,8 +5,8 @@ Two events inside one step cancel in every test at its ends. A step is therefore
 
 - the smooth functions of the tests have no zero in it that is not seen at its ends (`crossings`: interpolation through
   its ends and the samples beside it);
-- no contact begins or ceases to touch in it, or it is short. Where one does, the heights of the extrema over the gap at
-  both ends foretell where: the interval is cut close beside that place.
+- no contact begins or ceases to touch in it, or it is short. Where one does, the heights of the extremum over the gap
+  at both ends and their derivatives foretell where: the interval is cut close beside that place.
 
 On the side of a grazing on which the contact exists everything changes like a square root of the way to it: functions
 are interpolated over the root of the height of the excursion across the gap, where it shrinks to less than SHRINKS of
@@ -26,8 +26,10 @@ from typing import NamedTuple
 import numpy as np
 
 from suboctave.bifurcation.gaps import GapExtrema
+from suboctave.continuation.linear import length
 from suboctave.continuation.problem import Array
 from suboctave.curves.crossings import first_doubtful
+from suboctave.curves.events.grazings import height_gradient
 from suboctave.curves.sample import Sample
 from suboctave.curves.trace import Unsettled
 from suboctave.harmonic.trigonometric import passages
@@ -44,10 +46,12 @@ _REMEMBERED = 64
 _LAYER = 1e-3
 #: share to which an excursion across a gap may shrink in an interval
 _SHRINKS = 0.3
+#: halvings of an interval that tell where in it an extremum passes a gap
+_BISECTIONS = 24
 #: how far beside the place foretold for a grazing an interval is cut, in units of _LAYER: cut on both sides it is short
 _CLEAR = 0.4
 #: shares of an interval to which a cut keeps from its ends
-_ENDS = 0.1
+_ENDS = 0.02
 #: where an interval is cut whose contacts shrink in a way that is not told by one excursion, as a fraction of it, from
 #: the end towards which they do
 _CUT = 0.35
@@ -114,8 +118,7 @@ def _contacts_between(p: Sample, q: Sample) -> Contacts:
         pairs, count, crossed, other = passages(a.tau, a.value, a.curve, a.level, b.tau, b.value, b.curve, b.level)
         if count > 0:
             i, j = pairs[0].tolist()
-            before, behind = float(a.value[i]) - a.level, float(b.value[j]) - b.level
-            return Contacts(before / (before - behind))
+            return Contacts(_passage(*_rising(p, a, i), *_rising(q, b, j), q.place - p.place))
         if crossed != other:
             return Contacts(0.5)
         if not (young_a or young_b):
@@ -127,6 +130,26 @@ def _contacts_between(p: Sample, q: Sample) -> Contacts:
             if young_b.get(j, math.inf) < _SHRINKS * _over(a, i):
                 shrinking.append((n, float(b.tau[j]), float(b.curve[j]), True))
     return Contacts(None, tuple(shrinking))
+
+
+def _rising(sample: Sample, gap: GapExtrema, which: int) -> tuple[float, float]:
+    """How far one of a motion's extrema lies above its gap, and its derivative by the arclength."""
+    point, names, size = sample.point, sample.curve.names, sample.state.x.size
+    by_x, by_names = height_gradient(sample.state, gap.element, gap.index, float(gap.tau[which]), names)
+    change = by_x.ravel() @ point.tangent[:size] + by_names @ point.tangent[-len(names) :]
+    return float(gap.value[which]) - gap.level, float(change) / length(point.weights * point.tangent)
+
+
+def _passage(before: float, leaving: float, behind: float, arriving: float, h: float) -> float:
+    """Where in an interval of length h the cubic through two values of opposite sign, with derivatives, is zero."""
+    low, high = 0.0, 1.0
+    for _ in range(_BISECTIONS):
+        s = 0.5 * (low + high)
+        r = 1.0 - s
+        first, last = (1.0 + 2.0 * s) * before + s * h * leaving, (3.0 - 2.0 * s) * behind - r * h * arriving
+        value = r * r * first + s * s * last
+        low, high = (s, high) if (value > 0.0) == (before > 0.0) else (low, s)
+    return 0.5 * (low + high)
 
 
 def _over(gap: GapExtrema, which: int) -> float:
