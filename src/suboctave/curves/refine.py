@@ -202,7 +202,10 @@ def _refined(
             better = solve_or_behind(kind, guess)
             # beside a young contact Newton's method may run to the next bifurcation of the kind
             if neighbours is not None and not _lies_between(better, wide, *neighbours):
-                better = _between(kind, wide, *neighbours) or better
+                behind = behind_grazing(kind, guess)
+                if behind is None or not _lies_between(behind, wide, *neighbours):
+                    behind = _between(kind, wide, *neighbours)
+                better = behind or better
         except ConvergenceError as failure:
             warnings.append(
                 f"{kind.name} near omega = {state.omega:.6g} was located with {state.basis.harmonics} "
