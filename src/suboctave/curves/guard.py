@@ -25,7 +25,7 @@ import numpy as np
 
 from suboctave.compiled import kernel
 from suboctave.continuation.linear import length
-from suboctave.continuation.point import CurvePoint, between
+from suboctave.continuation.point import CurvePoint
 from suboctave.continuation.problem import Array
 from suboctave.curves.events.monitors import BRANCH_POINT, NEIMARK_SACKER, Located, changes
 from suboctave.curves.interior import FINEST, Interior, Steps, unsettled
@@ -41,8 +41,6 @@ MOVEMENT = 0.5
 _EXAMINED = 0.01
 #: steps shorter than this are not halved to tell a branch point from a jump between curves
 _JUMP = 1e-5
-#: a step belongs to one curve if its middle lies within this share of its length from where its ends say
-_AWAY = 0.03
 #: distance from a branch point, as a share of an interval, from which on one cuts it
 _CLEAR = 0.1
 #: the ends say so themselves if chord and tangents agree to this share of the length
@@ -171,14 +169,12 @@ class GuardedStep(Interior):
         return super().cut(p, q, share)
 
     def solved(self, fraction: float) -> Sample | None:
-        a, b = self.old.point, self.new.point
         try:
             sample = self.steps.solve(self.old, self.new, fraction, bool(self.crossings or self.turned))
         except ConvergenceError:
             self.refused = self.size > _JUMP
             return None
-        away = length(b.weights * (sample.point.u - between(a, b, fraction)))
-        self.refused = away > _AWAY * self.size and self.size > FINEST
+        self.refused = self.strays(sample, fraction)
         return None if self.refused else sample
 
     def doubt(self, p: Sample, q: Sample) -> tuple[float, str] | None:

@@ -27,6 +27,7 @@ import numpy as np
 
 from suboctave.bifurcation.gaps import GapExtrema
 from suboctave.continuation.linear import length
+from suboctave.continuation.point import between
 from suboctave.continuation.problem import Array
 from suboctave.curves.crossings import first_doubtful
 from suboctave.curves.events.grazings import height_gradient
@@ -40,6 +41,8 @@ __all__ = ["FINEST", "Interior", "Steps", "unsettled"]
 FINEST = 1e-5
 #: samples inside one step after which it is halved, or called unsettled
 MOST_PROBES = 60
+#: a step belongs to one curve if its interior lies within this share of its length from where its ends say
+_AWAY = 0.03
 #: pairs of samples whose contacts are remembered, at least
 _REMEMBERED = 64
 #: intervals shorter than this are not cut because a contact grazes in them
@@ -218,6 +221,11 @@ class Interior(ABC):
     @abstractmethod
     def harmless(self, p: Sample, q: Sample, reason: str) -> bool:
         """Whether an interval too short to be cut is done all the same."""
+
+    def strays(self, sample: Sample, fraction: float) -> bool:
+        """Whether the motion at a fraction of the step is not where the ends say: these lie on different curves."""
+        a, b = self.old.point, self.new.point
+        return self.size > FINEST and length(b.weights * (sample.point.u - between(a, b, fraction))) > _AWAY * self.size
 
     @property
     def inside(self) -> list[Sample]:

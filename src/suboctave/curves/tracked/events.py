@@ -381,12 +381,22 @@ class StepWatch(Steps):
         self.newton = newton
         #: the functions of the tests at the last points
         self._functions: dict[Sample, Array] = {}
+        self._last: _Step | None = None
+
+    def refuses(self, a: Sample, b: Sample) -> bool:
+        """Whether a step has gone over to another curve."""
+        return self._examined(a, b).refused
+
+    def _examined(self, a: Sample, b: Sample) -> _Step:
+        if self._last is None or self._last.old is not a or self._last.new is not b:
+            self._last = step = _Step(self, a, b, [f"two {test.kind} may lie" for test in self.tests])
+            if step.size > 0.0:
+                step.examine([(a, b)])
+        return self._last
 
     def passed(self, a: Sample, b: Sample, warnings: list[str]) -> list[LocatedEvent]:
         """The events between two neighbours, in the order met."""
-        step = _Step(self, a, b, [f"two {test.kind} may lie" for test in self.tests])
-        if step.size > 0.0:
-            step.examine([(a, b)])
+        step = self._examined(a, b)
         warnings += [f"{stretch}: a smaller max_step may tell" for stretch in joined(step.unsettled)]
         self.keep(step.samples)
         self._functions = {s: known for s, known in self._functions.items() if s in self._behind}
@@ -410,9 +420,11 @@ class _Step(Interior):
 
     def solved(self, fraction: float) -> Sample | None:
         try:
-            return Sample(point_between(self.old.point, self.new.point, fraction, self.steps.newton))
+            sample = Sample(point_between(self.old.point, self.new.point, fraction, self.steps.newton))
         except ConvergenceError:
             return None
+        self.refused = self.strays(sample, fraction)
+        return None if self.refused else sample
 
     def harmless(self, p: Sample, q: Sample, reason: str) -> bool:
         return reason not in self.reasons or self.steps.tests[self.reasons.index(reason)].changed(p, q)

@@ -72,6 +72,8 @@ class _Tracker(Driver):
         self.march = self._marching(start)
         self.tests = tests_of(start.curve)
         self.watch = StepWatch(self.tests, settings.newton)
+        #: the end of the step that was looked at last
+        self._candidate: Sample | None = None
         self.corners = 0
         #: how many points have known multipliers, and where none of these is the critical one
         self.compared = 0
@@ -150,7 +152,13 @@ class _Tracker(Driver):
             return False
         if way > _NEAR_END and not comes_close(Sample(a), Sample(b)):
             return False
-        return keeps_subharmonics(a, b) or (free and vanished(Sample(a), Sample(b)))
+        if not (keeps_subharmonics(a, b) or (free and vanished(Sample(a), Sample(b)))):
+            return False
+        last = self.previous
+        if last is None or last.place != a.arclength:
+            return True
+        self._candidate = new = Sample(b)
+        return not self.watch.refuses(last, new)
 
     def _crossed(self, b: Sample) -> bool:
         """Whether the orientation has changed since the last point because another curve crosses there, or because
@@ -166,7 +174,8 @@ class _Tracker(Driver):
 
     def _accept(self, point: CurvePoint) -> Ending | None:
         """Take a point in; why the curve ends there or before it, if it does."""
-        settings, new = self.settings, Sample(point)
+        settings, known = self.settings, self._candidate
+        new = known if known is not None and known.point is point else Sample(point)
         self.home = self.home or point
         if self.previous is not None:
             # by now the choice of harmonics has asked for what it needs
