@@ -90,6 +90,10 @@ class Steps:
         """Whether a contact begins or ceases to touch between two samples."""
         return self.contacts(p, q).grazes is not None
 
+    def parted(self, p: Sample, q: Sample) -> bool:
+        """Whether the functions looked at do not go on smoothly from one sample to a later one."""
+        return self.grazes(p, q)
+
     def contacts(self, p: Sample, q: Sample) -> Contacts:
         """What contacts do between two samples."""
         known = self._contacts.get((p, q))
@@ -304,7 +308,7 @@ class Interior(ABC):
 
     def _beside(self, start: int, way: int, h: float) -> tuple[list[Sample], Sample | None]:
         """Up to two of the four samples beyond one, neither too close together nor too far for an interval of length
-        h, as far as no contact begins or ceases to touch on the way; and the first one beyond.
+        h, as far as the functions go on smoothly; and the first one beyond.
         """
         chosen: list[Sample] = []
         first: Sample | None = None
@@ -314,7 +318,7 @@ class Interior(ABC):
             if not 0 <= k < len(samples):
                 break
             beyond = samples[k]
-            if self.steps.grazes(beyond, here) if way < 0 else self.steps.grazes(here, beyond):
+            if self.steps.parted(beyond, here) if way < 0 else self.steps.parted(here, beyond):
                 break
             if first is None:
                 first = beyond

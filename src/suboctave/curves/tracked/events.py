@@ -22,7 +22,7 @@ from suboctave.continuation.linear import Factor, length
 from suboctave.continuation.newton import NewtonOptions, correct, null_row
 from suboctave.continuation.point import CurvePoint, make_point, point_between, solved_again
 from suboctave.continuation.problem import Array
-from suboctave.curves.interior import Interior, Steps
+from suboctave.curves.interior import Interior, Steps, unsettled
 from suboctave.curves.kinds.extremum import LimitPointExtremal
 from suboctave.curves.kinds.grazing import GrazingEquations
 from suboctave.curves.kinds.singular import SingularOperator
@@ -389,9 +389,9 @@ class StepWatch(Steps):
 
     def _examined(self, a: Sample, b: Sample) -> _Step:
         if self._last is None or self._last.old is not a or self._last.new is not b:
-            self._last = step = _Step(self, a, b, [f"two {test.kind} may lie" for test in self.tests])
+            self._last = step = _Step(self, a, b)
             if step.size > 0.0:
-                step.examine([(a, b)])
+                step.look()
         return self._last
 
     def passed(self, a: Sample, b: Sample, warnings: list[str]) -> list[LocatedEvent]:
@@ -402,6 +402,10 @@ class StepWatch(Steps):
         self._functions = {s: known for s, known in self._functions.items() if s in self._behind}
         return events_between(step.inside, self.tests, self.newton, warnings)
 
+    def parted(self, p: Sample, q: Sample) -> bool:
+        # determinants and null vectors belong to a discretisation
+        return p.curve.balance is not q.curve.balance or super().parted(p, q)
+
     def functions(self, sample: Sample) -> Array:
         """The functions of the tests that are smooth along the curve: see `Interior.measures`."""
         known = self._functions.get(sample)
@@ -411,9 +415,35 @@ class StepWatch(Steps):
 
 
 class _Step(Interior):
-    """One step of a tracked curve under examination."""
+    """One step of a tracked curve under examination.
+
+    Where the harmonics have changed, the first sample is there twice, and the step is looked at from the second one on,
+    that of the new harmonics. Events are those between the first and the others, see `events_between`.
+    """
 
     steps: StepWatch
+
+    def __init__(self, steps: StepWatch, old: Sample, new: Sample) -> None:
+        super().__init__(steps, old, new, [f"two {test.kind} may lie" for test in steps.tests])
+        self.start = old
+        with suppress(ConvergenceError):
+            self.start = same_discretisation(old, new, steps.newton)
+        if self.start is not old:
+            self.samples.insert(self.first + 1, self.start)
+
+    @property
+    def inside(self) -> list[Sample]:
+        known = self.samples[self.first :]
+        return known if self.start is self.old else [self.old, *known[2:]]
+
+    def look(self) -> None:
+        """Examine all of it."""
+        self.examine([(self.start, self.new)])
+        first, again, second = self.old, self.start, self.inside[1]
+        for test, reason in zip(self.steps.tests, self.reasons, strict=True):
+            if again is not first and test.changed(first, again) and test.changed(again, second):
+                # of a pair that the change of harmonics may have brought about, or hidden, nothing is seen
+                self.unsettled.append(unsettled(first, second, reason))
 
     def measures(self, sample: Sample) -> Array:
         return self.steps.functions(sample)
