@@ -113,8 +113,7 @@ class _Tracker(Driver):
         if last is None or self.corners >= _CORNERS:
             return None
         self.corners += 1
-        before = (p.orbit for p in reversed(self.trace.points))
-        corner = beyond_corner(last, before, self.settings.newton)
+        corner = beyond_corner(last, self.settings.newton)
         if corner is None:
             return None
         point, note = corner
