@@ -65,8 +65,8 @@ def test_the_page_needs_nothing_from_outside(page, tmp_path):
     assert "default-src 'none'" in text
     assert "@import" not in text
     kinds = [kind for kind, _ in read.scripts]
-    assert kinds == ["application/json", "text/plain", ""]
-    plotly = gzip.decompress(base64.b64decode(read.scripts[1][1])).decode()
+    assert kinds == ["application/json", "application/json", "text/plain", ""]
+    plotly = gzip.decompress(base64.b64decode(read.scripts[2][1])).decode()
     assert "newPlot" in plotly
     assert len(text) < 3_000_000
 
@@ -105,12 +105,12 @@ def test_what_users_write_is_text(duffing, tmp_path):
     path = write_report(results, tmp_path / "evil.html", title=EVIL)
     read = Page(path.read_text(encoding="utf-8"))
     assert "b" not in read.tags
-    assert len(read.scripts) == 3 + 2  # two curves, one overview, Plotly, ours
+    assert len(read.scripts) == 3 + 3  # two curves, one overview, their points, Plotly, ours
     assert not any("alert(" in text for kind, text in read.scripts if kind == "")
     for kind, text in read.scripts:
         if kind == "application/json":
             assert "<" not in text
-            for trace in json.loads(text)["data"]:
+            for trace in json.loads(text)["data"] if text.startswith("{") else []:
                 for words in (trace["name"], trace["hovertemplate"], *trace["text"]):
                     assert "<script" not in words
                     assert "<b>" not in words
@@ -137,7 +137,7 @@ def test_curves_over_different_parameters_and_tables(page, duffing):
     along = curve_dataset(np.full(5, 2.0), p, parameters={"p": p}, free="p")
     table = xarray.Dataset({"omega": ("row", [1.0]), "mu": ("row", [0.5 + 0.25j]), "note": ("row", ["fine"])})
     read = page({"a": duffing(), "b": duffing(force=0.2), "c": along, "d": table})
-    figures = [json.loads(text) for kind, text in read.scripts if kind == "application/json"]
+    figures = [json.loads(text) for kind, text in read.scripts if kind == "application/json" and text.startswith("{")]
     assert [len({t["legendgroup"] for t in f["data"]}) for f in figures[:1]] == [2]
     assert len(figures) == 1 + 3
     assert [f["layout"]["xaxis"]["title"]["text"] for f in figures][-1] == "p"

@@ -161,6 +161,11 @@ class PeriodicOrbit:
     def _peak(self, c: ComplexArray) -> float:
         return peak(np.ascontiguousarray(c), 8 * self.basis.harmonics + 8)[0]
 
+    def along(self, direction: Array) -> ComplexArray:
+        """Complex amplitudes of `direction . x`, shape (H + 1,); `direction`: (n,), over the structure's DOFs."""
+        c: ComplexArray = self._moving @ self._linear.seen(direction)
+        return c
+
     def start(self) -> Array:
         """State `(x(0), dx/dt(0))`, shape (2 n,), from which time integration runs into this motion."""
         return np.concatenate((self.displacement(0.0), self.velocity(0.0)))
@@ -174,7 +179,7 @@ class PeriodicOrbit:
             )
         unit = np.zeros(n)
         unit[dof] = 1.0
-        c: ComplexArray = self._moving @ self._linear.seen(unit)
+        c = self.along(unit)
         return c * (1j * self.basis.multiples * self.omega) ** derivative if derivative else c
 
     def __repr__(self) -> str:

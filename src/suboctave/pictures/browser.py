@@ -15,7 +15,22 @@ from typing import Any
 import numpy as np
 
 from suboctave.pictures import style
-from suboctave.pictures.drawing import Axis, Beads, Drawing, Item, Label, Markers, Polyline, Region, Surface
+from suboctave.pictures.drawing import (
+    Axis,
+    Band,
+    Beads,
+    Drawing,
+    Entry,
+    Frame,
+    Guide,
+    Item,
+    Label,
+    Markers,
+    Polyline,
+    Raster,
+    Region,
+    Surface,
+)
 from suboctave.pictures.strokes import DIGITS, spelt
 
 SYMBOLS: dict[str | tuple[int, int, int], str] = {
@@ -57,7 +72,7 @@ def figure_data(drawing: Drawing, name: str) -> dict[str, Any]:
     # one trace for all strokes of one look and name, and one for every other thing
     traces: dict[Any, list[Item]] = {}
     for number, item in enumerate(frame.items):
-        key: Any = (item.name, item.role, item.pen) if isinstance(item, Polyline) else number
+        key: Any = (item.name, item.role, item.pen, item.curve) if isinstance(item, Polyline) else number
         traces.setdefault(key, []).append(item)
     for items in traces.values():
         item = items[0]
@@ -66,16 +81,65 @@ def figure_data(drawing: Drawing, name: str) -> dict[str, Any]:
             "legendgroup": html_of(item.group or item.name),
             "showlegend": any(shown.get(one.name) is one for one in items),
         }
-        drawn = _trace(items, drawing.axes)
+        drawn = _trace(items, drawing.axes, frame)
         if drawn:
-            data.append(drawn | entry)
+            data.append(drawn | entry | _vertices(items))
+    if any(isinstance(item, Raster) for item in frame.items):
+        data += [_patch(name, own) for name, own in frame.entries.items() if own.colour]
     if frame.labels and not in_space:
         data.append(_labels(frame.labels, drawing.axes))
     layout = _space(drawing) if in_space else _plane(drawing)
     return {"data": data, "layout": layout, "name": name, **({"space": True} if in_space else {})}
 
 
-def _trace(items: Sequence[Item], axes: Sequence[Axis]) -> dict[str, Any]:
+def _vertices(items: Sequence[Item]) -> dict[str, Any]:
+    """Which points and events of which curve the places of a trace are: the page knows more of them."""
+    known = [item.vertices for item in items if item.vertices is not None]
+    if items[0].curve < 0 or len(known) < len(items):
+        return {}
+    gap = [None] if isinstance(items[0], Polyline) else []
+    every = [vertex for own in known for vertex in (*own.tolist(), *gap)]
+    return {"meta": {"curve": items[0].curve, "role": items[0].role}, "customdata": every[: len(every) - len(gap)]}
+
+
+def _patch(name: str, entry: Entry) -> dict[str, Any]:
+    """An entry of the legend for cells of one colour, which no trace of their own have."""
+    mark = {"symbol": "square", "size": 11, "color": entry.colour, "line": {"color": style.SOFT, "width": 0.5}}
+    return {"type": "scatter", "mode": "markers", "x": [None], "y": [None], "name": html_of(name), "marker": mark}
+
+
+#: cells of a raster that the browser is given, along each side, and how many colours
+_CELLS, _COLOURS = 320, 250
+
+
+def _raster(item: Raster, frame: Frame) -> dict[str, Any]:
+    """Cells by the numbers of their colours, with what the legend calls these."""
+    rows, columns = (np.arange(0, count, max(1, math.ceil(count / _CELLS))) for count in item.cells.shape[:2])
+    steps = np.round(item.cells[np.ix_(rows, columns)] * 255.0).astype(int)
+    found, cells = np.unique(steps.reshape(-1, 3), axis=0, return_inverse=True)
+    if len(found) > _COLOURS:  # shades of growth: in coarser steps
+        found, cells = np.unique(steps.reshape(-1, 3) // 16 * 16, axis=0, return_inverse=True)
+    colours = [f"#{r:02x}{g:02x}{b:02x}" for r, g, b in found]
+    named = {entry.colour.lower(): html_of(name) for name, entry in reversed(frame.entries.items()) if entry.colour}
+    top = len(colours)
+    scale = [[(i + end) / top, colour] for i, colour in enumerate(colours) for end in (0, 1)]
+    middles = (0.5 * (edges[1:] + edges[:-1]) for edges in (item.across[:], item.upwards[:]))
+    x, y = (own[which] for own, which in zip(middles, (columns, rows), strict=True))
+    return {
+        "type": "heatmap",
+        "x": _short(x),
+        "y": _short(y),
+        "z": cells.reshape(len(rows), len(columns)).tolist(),
+        "zmin": -0.5,
+        "zmax": top - 0.5,
+        "colorscale": scale,
+        "showscale": False,
+        "meta": {"cells": [named.get(colour, "") for colour in colours]},
+        "hovertemplate": "%{x:.6g}, %{y:.6g}<extra></extra>",
+    }
+
+
+def _trace(items: Sequence[Item], axes: Sequence[Axis], frame: Frame) -> dict[str, Any]:
     """The trace of a thing, or of several strokes; empty for what is drawn on paper alone."""
     match items[0]:
         case Polyline():
@@ -86,6 +150,8 @@ def _trace(items: Sequence[Item], axes: Sequence[Axis]) -> dict[str, Any]:
             limits = np.array([(axis.low, axis.high) for axis in axes], dtype=float)
             at = item.places(limits[:, 0], limits[:, 1], _SCREEN)
             return _markers(item, at) if at.shape[1] else {}
+        case Raster() as item:
+            return _raster(item, frame)
         case Region() as item if len(item.outline) == 2:
             fill = {"fill": "toself", "fillcolor": item.colour, "line": {"width": 0}, "hoverinfo": "skip"}
             return {"type": "scatter", "mode": "lines", **_coordinates(item.outline), **fill}
@@ -173,13 +239,21 @@ def _short(values: np.ndarray) -> list[float | None]:
 
 # --------------------------------------------------------------------------------------------------------------- layout
 def _axis(axis: Axis, **others: Any) -> dict[str, Any]:
-    limits = {} if axis.low is None or axis.high is None else {"range": [axis.low, axis.high]}
+    limits: dict[str, Any] = {}
+    if axis.low is not None and axis.high is not None:
+        ends = [axis.low, axis.high]
+        limits = {"range": [math.log10(end) for end in ends] if axis.logarithmic else ends}
+    if axis.logarithmic:
+        limits["type"] = "log"
+    elif axis.low is not None and axis.high is None:
+        limits["rangemode"] = "tozero"
     return {**_AXIS, "title": {"text": html_of(axis.label)}, **limits, **others}
 
 
 def _plane(drawing: Drawing) -> dict[str, Any]:
     across, upwards = (_axis(axis, mirror=True, ticks="inside") for axis in drawing.axes)
     across["title"]["standoff"] = 8
+    shapes = [shape for item in drawing.frames[0].items for shape in _shape(item)]
     return {
         **_PAGE,
         "margin": {"l": 64, "r": 12, "t": 34, "b": 52},
@@ -188,7 +262,23 @@ def _plane(drawing: Drawing) -> dict[str, Any]:
         "hoverlabel": {"align": "left"},
         "xaxis": {**across, "automargin": True},
         "yaxis": upwards,
+        **({"shapes": shapes} if shapes else {}),
     }
+
+
+def _shape(item: Item) -> list[dict[str, Any]]:
+    """A straight line or a band through the whole frame."""
+    if isinstance(item, Band):
+        return [
+            {"type": "rect", "xref": "paper", "x0": 0, "x1": 1, "y0": item.low, "y1": item.high, "layer": "below"}
+            | {"fillcolor": item.colour, "line": {"width": 0}}
+        ]
+    if isinstance(item, Guide):
+        ends = ("y", "x") if item.upright else ("x", "y")
+        along = {f"{ends[0]}ref": "paper", f"{ends[0]}0": 0, f"{ends[0]}1": 1}
+        line = {"color": item.pen.colour, "width": _LINE * item.pen.width}
+        return [{"type": "line", **along, f"{ends[1]}0": item.value, f"{ends[1]}1": item.value, "line": line}]
+    return []
 
 
 def _space(drawing: Drawing) -> dict[str, Any]:

@@ -24,7 +24,9 @@ class _Seen:
     """What everything that is drawn has.
 
     `role`: what it is, in one word; `layer`: higher ones cover lower ones; `name`, `group`: its entry in a legend of
-    the browser, and what is hidden with it; `hover()`, (vertices,): what is said of each vertex under the mouse.
+    the browser, and what is hidden with it; `hover()`, (vertices,): what is said of each vertex under the mouse;
+    `curve`, `vertices`: the number that the curve has on a page (its attribute `number`), -1 without one, and which
+    point each vertex is, or -1 - e for event e, (vertices,).
     """
 
     role: str = ""
@@ -32,6 +34,8 @@ class _Seen:
     name: str = ""
     group: str = ""
     hover: Callable[[], Sequence[str]] | None = None
+    curve: int = -1
+    vertices: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -146,6 +150,13 @@ class Entry:
     edge: str | None = None
     opacity: float = 1.0
     hatch: str = ""
+
+    @property
+    def colour(self) -> str:
+        """The colour of a patch, or of a square that stands for one; else empty."""
+        if self.patch is not None:
+            return self.patch
+        return self.mark.face if self.mark is not None and self.mark.marker == "s" else ""
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from functools import partial, wraps
 from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -77,9 +78,19 @@ def figure_of(drawing: Drawing, sheet: style.Sheet, path: str | Path | None = No
         _in_plane(figure, drawing, sheet)
     if path is not None:
         save_figure(figure, path)
+    _DRAWINGS[figure] = drawing
     # Notebooks show an object that has this; without pyplot nothing else would tell them to.
     setattr(figure, "_repr_png_", partial(image_of, figure, "png", dpi=110.0))  # noqa: B010
     return figure
+
+
+#: the drawings of figures, for who shows them elsewhere too
+_DRAWINGS: WeakKeyDictionary[Figure, Drawing] = WeakKeyDictionary()
+
+
+def drawing_of(figure: Figure) -> Drawing | None:
+    """What a figure shows; None of one that was drawn otherwise."""
+    return _DRAWINGS.get(figure)
 
 
 class _Page(PageOptions, total=False):

@@ -1,7 +1,9 @@
-"""One page per study: interactive figures, tables of bifurcations, and where the numbers come from.
+"""One page per study: interactive figures, what is known of every point of their curves, tables, and where numbers come
+from.
 
 The page is a single file that needs no network. Without scripts (and on paper) it shows still pictures; its tables and
-texts need none. It is written by the template `templates/page.html`, which escapes everything that comes from a user.
+texts need none. It is written by the template `templates/page.html`, which escapes everything that comes from a user;
+the scripts beside it draw the figures, and fill the panel of a point that was chosen.
 """
 
 from __future__ import annotations
@@ -9,10 +11,9 @@ from __future__ import annotations
 import base64
 import functools
 import gzip
-import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +21,6 @@ import numpy as np
 
 from suboctave.atomic import free_place, replace_file
 from suboctave.errors import InputError, shortened
-from suboctave.kinds import KINDS
 from suboctave.pictures import style
 from suboctave.pictures.boundary import (
     boundary_drawing,
@@ -33,12 +33,24 @@ from suboctave.pictures.boundary import (
     space_drawing,
 )
 from suboctave.pictures.browser import figure_data
-from suboctave.pictures.drawing import Drawing
-from suboctave.pictures.paper import figure_of, image_of
+from suboctave.pictures.drawing import Drawing, Polyline
+from suboctave.pictures.paper import drawing_of, figure_of, image_of
+from suboctave.pictures.points import Verified, curve_data, verified_by
 from suboctave.pictures.response import response_drawing
-from suboctave.pictures.strokes import fixed_parameters, spelt
-from suboctave.pictures.style import period_name, period_of
-from suboctave.store.layout import check_layout, coordinate, parameter_column
+from suboctave.pictures.strokes import hover_of, number_of, spelt
+from suboctave.pictures.style import Pen, period_of
+from suboctave.pictures.tables import (
+    Table,
+    bifurcations,
+    columns_of,
+    isolas_table,
+    notes_on,
+    notes_on_isolas,
+    origin_of,
+    records_of,
+    summary_of,
+)
+from suboctave.store.layout import check_layout, coordinate
 from suboctave.version import __version__
 
 if TYPE_CHECKING:
@@ -51,18 +63,32 @@ _SIZE, _SIZE_IN_SPACE = (6.4, 4.2), (6.4, 4.8)
 
 @dataclass(frozen=True)
 class Figure:
-    """One figure: data for the browser, the still picture (SVG, base64), words for those who see neither."""
+    """One figure: data for the browser, None where it is a still picture only; this (SVG, base64); and words for those
+    who see neither.
+    """
 
-    data: dict[str, Any]
+    data: dict[str, Any] | None
     still: str
     words: str
 
 
+@dataclass(frozen=True)
+class Curve:
+    """A curve on the page: heading, figure, its dataset, and where it stands."""
+
+    heading: str
+    figure: Figure
+    dataset: xarray.Dataset
+
+    @property
+    def anchor(self) -> str:
+        """Where links lead to."""
+        return f"curve-{number_of(self.dataset)}"
+
+
 @dataclass
 class Section:
-    """A part of the page: sentences before and after a table, notes, figures, a tree of branches, and curves: heading,
-    figure, and the dataset, of which the template reads tables and sentences.
-    """
+    """A part of the page: sentences before and after a table, notes, figures, a tree of branches, and curves."""
 
     heading: str
     anchor: str = ""
@@ -72,25 +98,55 @@ class Section:
     notes: Sequence[str] = ()
     figures: Sequence[Figure] = ()
     tree: str = ""
-    curves: Sequence[tuple[str, Figure, xarray.Dataset]] = ()
+    curves: Sequence[Curve] = ()
+
+
+@dataclass
+class Found:
+    """The results of a study as the page shows them: their datasets by name, pictures of what is no curve, checks."""
+
+    datasets: dict[str, dict[str, xarray.Dataset]] = field(default_factory=dict)
+    pictures: dict[str, Any] = field(default_factory=dict)
+    checks: list[xarray.Dataset] = field(default_factory=list)
+    #: what is known of each numbered curve, ready for JSON, and what shooting said of it
+    curves: list[dict[str, Any]] = field(default_factory=list)
+    verified: dict[int, Verified] = field(default_factory=dict)
+
+    @property
+    def alone(self) -> dict[str, xarray.Dataset]:
+        """The curves and tables that are all of a result."""
+        return {name: own[""] for name, own in self.datasets.items() if list(own) == [""]}
+
+    @property
+    def every(self) -> list[xarray.Dataset]:
+        """All datasets, in their order."""
+        return [dataset for own in self.datasets.values() for dataset in own.values()]
 
 
 def write_report(
-    results: Mapping[str, Any], path: str | Path, *, title: str = "Study", overwrite: bool = False
+    results: Mapping[str, Any],
+    path: str | Path,
+    *,
+    title: str = "Study",
+    overwrite: bool = False,
+    failures: Mapping[str, str] | None = None,
 ) -> Path:
     """Write the report page of a study.
 
     Parameters
     ----------
     results
-        Names of analyses and their curves: datasets (`to_xarray`), branches, bifurcation diagrams, or isolas. Datasets
-        on the dimension `row` are shown as tables.
+        Names of analyses and their curves: datasets (`to_xarray`), branches, bifurcation diagrams, isolas; maps, basins
+        and other results in time, or tables of them. Datasets on the dimension `row` are shown as tables. The panel of
+        a point shows its motion where branches are given, or datasets with motions (`to_xarray(motions=True)`).
     path
         A file ending in .html or .htm; written beside its place and renamed.
     title
         Heading of the page.
     overwrite
         Whether an existing file is replaced.
+    failures
+        Names of analyses that gave nothing, and why: listed among what needs attention.
 
     Raises
     ------
@@ -102,27 +158,37 @@ def write_report(
         raise InputError(f"results must be a mapping {{name: curve}}, not {shortened(results)}")
     if not results:
         raise InputError("a report needs at least one result")
-    datasets = {str(name): _datasets(str(name), item) for name, item in results.items()}
-    alone = {name: next(iter(own.values())) for name, own in datasets.items() if list(own) == [""]}
-    anchors = {name: f"part-{index}" for index, name in enumerate(datasets)}
-    sections = list(_overviews({name: data for name, data in alone.items() if _has_points(data)}))
-    for name, item in zip(datasets, results.values(), strict=True):
-        section = _section(name, datasets[name], item)
-        section.anchor = anchors[name]
-        sections.append(section)
-    every = [dataset for own in datasets.values() for dataset in own.values()]
-    versions = sorted({str(data.attrs["suboctave"]) for data in every if "suboctave" in data.attrs})
-    systems = dict.fromkeys(str(data.attrs["system"]) for data in every if data.attrs.get("system"))
-    text = _template().render(
-        title=str(title),
-        version=__version__,
-        origin=" · ".join([f"suboctave {', '.join(versions) or __version__}", *systems]),
-        links=[(anchors[name], name) for name in datasets] if len(datasets) > 1 else [],
-        sections=sections,
-        plotly=_plotly() if any(section.figures or section.curves for section in sections) else "",
-    )
+    text = page_of(results, str(title), failures or {})
     replace_file(target, lambda place: place.write_text(text, encoding="utf-8"))
     return target
+
+
+def page_of(results: Mapping[str, Any], title: str, failures: Mapping[str, str] | None = None) -> str:
+    """The text of the page that `write_report` writes."""
+    found = _found(results)
+    anchors = {name: f"part-{index}" for index, name in enumerate(found.datasets)}
+    sections = list(_overviews({name: data for name, data in found.alone.items() if _has_points(data)}))
+    for name, item in zip(found.datasets, results.values(), strict=True):
+        section = _section(name, found, item)
+        section.anchor = anchors[name]
+        sections.append(section)
+    versions = sorted({str(data.attrs["suboctave"]) for data in found.every if "suboctave" in data.attrs})
+    systems = dict.fromkeys(str(data.attrs["system"]) for data in found.every if data.attrs.get("system"))
+    text: str = _template().render(
+        title=title,
+        version=__version__,
+        origin=" · ".join([f"suboctave {', '.join(versions) or __version__}", *systems]),
+        links=[(anchors[name], name) for name in found.datasets] if len(found.datasets) > 1 else [],
+        counts=_counts(found, anchors),
+        attention=[
+            *((f"analysis {name}: failed. {why}", "") for name, why in (failures or {}).items()),
+            *_attention(sections, found),
+        ],
+        sections=sections,
+        curves=found.curves,
+        plotly=_plotly() if any(section.figures or section.curves for section in sections) else "",
+    )
+    return text
 
 
 @functools.cache
@@ -131,7 +197,7 @@ def _template() -> Any:
 
     loader = PackageLoader("suboctave.pictures", "templates")
     page = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    readers = (is_boundary, summary_of, bifurcations, notes_on, origin_of, records_of)
+    readers = (is_boundary, summary_of, bifurcations, notes_on, origin_of, records_of, number_of)
     page.globals |= {reader.__name__: reader for reader in readers}
     page.policies["json.dumps_kwargs"] = {"ensure_ascii": False, "separators": (",", ":")}
     return page.get_template("page.html")
@@ -146,11 +212,44 @@ def _plotly() -> str:
 
 
 # ------------------------------------------------------------------------------------------------------------- contents
+def _found(results: Mapping[str, Any]) -> Found:
+    """The datasets of all results, every curve with points numbered; pictures of what is no curve."""
+    found = Found()
+    for name, item in results.items():
+        found.datasets[str(name)] = _datasets(str(name), item)
+        # of a table what it was taken from; maps and results in time are both
+        whole: Any = getattr(item, "result", None) or (item if hasattr(item, "to_table") else None)
+        if hasattr(whole, "plot"):
+            found.pictures[str(name)] = whole.plot()
+        if hasattr(whole, "bifurcations_frame") and hasattr(whole, "disagreements"):
+            found.checks.append(whole.to_xarray())
+    for name, own in found.datasets.items():
+        for label, dataset in own.items():
+            if is_isolas(dataset) or not _has_points(dataset):
+                continue
+            number = len(found.curves)
+            own[label] = dataset.assign_attrs(number=number)
+            verified = verified_by(found.checks, dataset)
+            if verified is not None:
+                found.verified[number] = verified
+            found.curves.append(curve_data(own[label], f"{name}, {label}" if label else name, verified))
+    return found
+
+
 def _datasets(name: str, item: Any) -> dict[str, xarray.Dataset]:
     """The datasets of a result by their names; the only one of a curve or a table has none."""
     import xarray
 
-    given: Any = item.to_xarray() if hasattr(item, "to_xarray") and not isinstance(item, xarray.Dataset) else item
+    given: Any = item
+    if hasattr(item, "to_table"):
+        given = item.to_table().to_xarray()
+    elif hasattr(item, "bifurcations_frame"):  # curves: with their motions
+        given = item.to_xarray(motions=True)
+        seconds = getattr(item, "seconds", None)
+        if seconds is not None and isinstance(given, xarray.Dataset):
+            given = given.assign_attrs(seconds=float(seconds))
+    elif hasattr(item, "to_xarray") and not isinstance(item, xarray.Dataset):
+        given = item.to_xarray()
     every = given if isinstance(given, dict) and given else {"": given}
     for dataset in every.values():
         if not isinstance(dataset, xarray.Dataset):
@@ -166,11 +265,12 @@ def _has_points(dataset: xarray.Dataset) -> bool:
     return bool(dataset.sizes.get("point", 0))
 
 
-def _section(name: str, datasets: Mapping[str, xarray.Dataset], item: Any) -> Section:
+def _section(name: str, found: Found, item: Any) -> Section:
+    datasets = found.datasets[name]
     head = next((dataset for dataset in datasets.values() if is_isolas(dataset)), None)
     curves = {label: dataset for label, dataset in datasets.items() if not is_isolas(dataset)}
     if head is not None:
-        return _isolas(name, head, curves)
+        return _isolas(name, head, curves, found.alone)
     if list(curves) != [""]:  # all curves in one figure, the tree, and each branch by itself
         figure = _responses(curves, getattr(item, "legend", None))
         each = [_curve(label, data, f"{name}, branch {label}") for label, data in curves.items()]
@@ -178,36 +278,75 @@ def _section(name: str, datasets: Mapping[str, xarray.Dataset], item: Any) -> Se
     (dataset,) = curves.values()
     if _has_points(dataset):
         return Section(name, curves=[_curve(name, dataset)])
-    if "row" not in dataset.sizes:
+    if "row" not in dataset.sizes and name not in found.pictures:
         return Section(name, before=["a curve without points"])
     heading = str(dataset.attrs.get("title", ""))
-    return Section(name, before=[heading] if heading else [], table=columns_of(dataset))
+    figures = [_pictured(name, found.pictures[name])] if name in found.pictures else []
+    table = columns_of(dataset) if "row" in dataset.sizes else None
+    return Section(name, before=[heading] if heading else [], table=table, figures=figures)
 
 
-def _isolas(name: str, head: xarray.Dataset, curves: Mapping[str, xarray.Dataset]) -> Section:
-    """Table and sentences; the regions in the plane, the surfaces where branches are known; each curve by itself."""
+def _isolas(
+    name: str, head: xarray.Dataset, curves: Mapping[str, xarray.Dataset], others: Mapping[str, xarray.Dataset]
+) -> Section:
+    """Table and sentences; the regions in the plane, closed branches beside the responses at the same parameters, the
+    surfaces on which they lie; each curve by itself.
+    """
     parameter, figures = parameter_of(head), []
     bounds = {label: data for label, data in curves.items() if is_boundary(data)}
     closed = {label: data for label, data in curves.items() if label not in bounds}
+    responses = {
+        n: d for n, d in others.items() if _has_points(d) and not is_boundary(d) and d.attrs["free"] == "omega"
+    }
     file_name = _file_name([name])
     if bounds:
-        words = f"Isolas over ω and {parameter}"
-        figures.append(_figure(boundary_drawing([head, *bounds.values()]), file_name, words))
+        drawing = boundary_drawing([head, *bounds.values()])
+        _add_sections(drawing, {**closed, **responses}, parameter)
+        figures.append(_figure(drawing, file_name, f"Isolas over ω and {parameter}"))
     if closed:
         periods = {int(nu) for nu in head["period"].to_numpy()}
         own = {k: c for k, c in bounds.items() if kind_of(c) == "LP" and period_of(c) in periods}
         group = {"isolas": head, **own, **closed}
         drawing = space_drawing(list(group.values()), x="omega", y=parameter, names=list(group))
         figures.append(_figure(drawing, f"{file_name}_space", f"Closed branches over ω and {parameter}"))
+        values = {_value(data, parameter) for data in closed.values()}
+        beside = {n: d for n, d in responses.items() if _value(d, parameter) in values}
+        figures.append(_responses({**beside, **closed}, [*beside, *closed]))
     each = [_curve(label, data, f"{name}, {label}") for label, data in {**bounds, **closed}.items()]
     sentences, notes = notes_on_isolas(head)
     texts: dict[str, Any] = {"before": [str(head.attrs.get("said", ""))], "after": sentences, "notes": notes}
-    return Section(name, table=isolas_table(head), figures=figures, curves=each, **texts)
+    return Section(name, table=isolas_table(head, closed), figures=figures, curves=each, **texts)
 
 
-def _curve(name: str, dataset: xarray.Dataset, heading: str = "") -> tuple[str, Figure, xarray.Dataset]:
+def _value(dataset: xarray.Dataset, parameter: str) -> float | None:
+    """The value of a parameter along a curve, to 9 digits; None where it varies, or is none of the curve's."""
+    if parameter not in dataset["parameter"].to_numpy():
+        return None
+    values = coordinate(dataset, parameter)[0]
+    return float(f"{values[0]:.9g}") if np.ptp(values) == 0.0 else None
+
+
+def _add_sections(drawing: Drawing, responses: Mapping[str, xarray.Dataset], parameter: str) -> None:
+    """In a plane of omega and a parameter, the lines along which responses were computed: they lead to these."""
+    frame, (across, upwards) = drawing.frames[0], drawing.axes
+    words = "computed responses"
+    for name, dataset in responses.items():
+        value, omega = _value(dataset, parameter), dataset["omega"].to_numpy()
+        if value is None or upwards.low is None or upwards.high is None or not upwards.low <= value <= upwards.high:
+            continue
+        inside = np.flatnonzero((omega >= (across.low or 0.0)) & (omega <= (across.high or np.inf)))
+        if not inside.size:
+            continue
+        at = np.array([omega[inside], np.full(inside.size, value)])
+        texts = [f"{name}\n{text}" for text in hover_of(dataset)(inside, np.full(inside.size, -1))]
+        own: dict[str, Any] = {"curve": number_of(dataset), "vertices": inside, "group": words}
+        seen: dict[str, Any] = {"role": "section", "layer": 2.0, "name": words, "hover": texts.copy}
+        frame.add(Polyline(at, Pen(style.SOFT, 0.6), **seen, **own), words)
+
+
+def _curve(name: str, dataset: xarray.Dataset, heading: str = "") -> Curve:
     draw = _boundaries if is_boundary(dataset) else _responses
-    return heading, draw({name: dataset}), dataset
+    return Curve(heading, draw({name: dataset}), dataset)
 
 
 def _overviews(curves: Mapping[str, xarray.Dataset]) -> Iterator[Section]:
@@ -224,8 +363,9 @@ def _overviews(curves: Mapping[str, xarray.Dataset]) -> Iterator[Section]:
             yield Section(f"All curves over {spelt(free)}", figures=[_responses(group, list(group))])
     for (first, second), bounds in planes.items():
         plane = f"{spelt(first)} and {spelt(second)}"
-        if len(bounds) > 1:
-            yield Section(f"Boundaries over {plane}", figures=[_boundaries(bounds)])
+        flat = {name: data for group in groups.values() for name, data in group.items()}
+        if len(bounds) > 1 or (bounds and flat):
+            yield Section(f"Boundaries over {plane}", figures=[_boundaries(bounds, flat)])
         observed = {_observed(data) for data in bounds.values()}
         near = [g for (free, *seen), g in groups.items() if free in (first, second) and tuple(seen) in observed]
         if near and len(observed) == 1:
@@ -248,11 +388,16 @@ def _responses(curves: Mapping[str, xarray.Dataset], labels: Sequence[str] | Non
     return _figure(drawing, _file_name(curves), f"Amplitude over {spelt(free)}: {', '.join(curves)}")
 
 
-def _boundaries(curves: Mapping[str, xarray.Dataset]) -> Figure:
+def _boundaries(curves: Mapping[str, xarray.Dataset], responses: Mapping[str, xarray.Dataset] | None = None) -> Figure:
+    """Curves of bifurcations in their plane, and the lines along which responses were computed."""
     group = list(curves.values())
     kinds, plane = boundary_names(group), " and ".join(map(spelt, plane_of(group[0])))
     labels = [f"{name}: {kind}" for name, kind in zip(curves, kinds, strict=True)] if len(curves) > 1 else kinds
-    return _figure(boundary_drawing(group, labels=labels), _file_name(curves), f"{', '.join(curves)}, over {plane}")
+    drawing, (first, second) = boundary_drawing(group, labels=labels), plane_of(group[0])
+    if first == "omega":
+        own = {n: data for n, data in (responses or {}).items() if data.attrs["free"] == "omega"}
+        _add_sections(drawing, own, second)
+    return _figure(drawing, _file_name(curves), f"{', '.join(curves)}, over {plane}")
 
 
 def _figure(drawing: Drawing, name: str, words: str) -> Figure:
@@ -262,208 +407,64 @@ def _figure(drawing: Drawing, name: str, words: str) -> Figure:
     return Figure(figure_data(drawing, name), still, words)
 
 
+def _pictured(name: str, figure: Any) -> Figure:
+    """A figure of a map, of basins, ...: for the browser as well where its drawing is known."""
+    drawing, still = drawing_of(figure), base64.b64encode(image_of(figure, "svg")).decode("ascii")
+    data = None if drawing is None or len(drawing.frames) > 1 else figure_data(drawing, _file_name([name]))
+    return Figure(data, still, f"Picture of {name}")
+
+
 def _file_name(names: Sequence[str] | Mapping[str, Any]) -> str:
     return re.sub(r"[^\w-]+", "_", "_".join(names))[:60] or "figure"
 
 
-# --------------------------------------------------------------------------------- tables and sentences, as plain texts
-_TEXT = "text"
-#: attributes of a dataset that have a place of their own on the page, or none
-_PLACED = {"layout", "suboctave", "system", "free", "ended", "closed", "period", "observed_dof", "dofs", "warnings"}
-_PLACED |= {"record", "digest", "contents", "tracked", "plane", "isola", "at", "seconds"}
-#: characters of an attribute from which it is folded away, and of a row of a table that stands beside its figure
-_LONG, _BESIDE = 400, 56
+# -------------------------------------------------------------------------------------------------------------- summary
+def _counts(found: Found, anchors: Mapping[str, str]) -> list[tuple[int, str, str]]:
+    """What was found: how many, of what, and where the first of it stands."""
+    curves = [data for data in found.every if _has_points(data) and not is_isolas(data)]
+    counts: list[tuple[int, str, str]] = []
+    if curves:
+        points = sum(data.sizes["point"] for data in curves)
+        first = f"curve-{number_of(curves[0])}"
+        counts += [(len(curves), "curve" if len(curves) == 1 else "curves", first), (points, "points", first)]
+    kinds: dict[str, list[int]] = {}
+    for data in curves:
+        for kind in data["event_kind"].to_numpy():
+            kinds.setdefault(str(kind), []).append(number_of(data))
+    for kind, where in kinds.items():
+        name = style.kind_style(kind).name
+        counts.append((len(where), name if len(where) == 1 else _several(name), f"curve-{where[0]}"))
+    for name, own in found.datasets.items():
+        for head in filter(is_isolas, own.values()):
+            number = int(head.sizes["isola"])
+            counts.append((number, "isola" if number == 1 else "isolas", anchors[name]))
+    for name in found.pictures:
+        counts.append((1, name, anchors[name]))
+    return counts
 
 
-@dataclass(frozen=True)
-class Table:
-    """Columns: heading, class ("", "text", "long"), and the cells."""
-
-    columns: Sequence[tuple[str, str, Sequence[str]]]
-
-    @property
-    def rows(self) -> list[tuple[str, ...]]:
-        """The cells row by row."""
-        return list(zip(*(cells for _, _, cells in self.columns), strict=True))
-
-    @property
-    def wide(self) -> bool:
-        """Whether there is no room for it beside a figure."""
-        return sum(max(map(len, (heading, *cells))) for heading, _, cells in self.columns) > _BESIDE
+def _several(name: str) -> str:
+    """A name of a kind, several of it."""
+    if name.endswith(("s", "um")):
+        return {"extremum": "extrema"}.get(name, name)
+    return f"{name[:-1]}ies" if name.endswith("y") else f"{name}s"
 
 
-def summary_of(dataset: xarray.Dataset) -> str:
-    """How many points a curve has, how many of them are unstable, of which period, and why it ends."""
-    count, unstable, nu = dataset.sizes["point"], "", period_of(dataset)
-    bounds = is_boundary(dataset)
-    if "stable" in dataset:
-        number = int(np.count_nonzero(~dataset["stable"].to_numpy().astype(bool)))
-        unstable = f", {number} within unstable motions" if bounds else f", {number} of them unstable"
-    kind = kind_of(dataset) if bounds else ""
-    begin = f"curve of bifurcations of the kind {kind} ({style.kind_style(kind).name}): " if bounds else ""
-    motions = f"; motions of {nu} periods of the force" if nu > 1 else ""
-    ended = f"; {dataset.attrs['ended']}" if dataset.attrs.get("ended") else ""
-    return f"{begin}{count} points{unstable}{motions}{ended}"
-
-
-def bifurcations(dataset: xarray.Dataset) -> Table:
-    """The located events of a curve, in the order met."""
-    names = plane_of(dataset) if is_boundary(dataset) else (str(dataset.attrs["free"]),)
-    own, remarks = ("kind", "ω", "max |x|", "multiplier", "residual", "remark"), _remarks(dataset)
-    kinds, omega, amplitude, multiplier, residual = (
-        dataset[f"event_{name}"].to_numpy() for name in ("kind", "omega", "amplitude", "multiplier", "residual")
-    )
-    words = [(kind, style.kind_style(kind).name) for kind in map(str, kinds)]
-    columns: list[tuple[str, str, Sequence[str]]] = [
-        ("kind", _TEXT, [f"{k} ({n})" if k.isupper() and n != k else n for k, n in words]),
-        ("ω", "", _texts(omega)),
-        *((parameter_column(n, own), "", _texts(coordinate(dataset, n)[1])) for n in names if n != "omega"),
-        ("max |x|", "", _texts(amplitude, 7)),
-        ("multiplier", "", [_number(complex(mu)) for mu in multiplier]),
-        ("residual", "", [_small(value) for value in residual]),
-    ]
-    return Table([*columns, ("remark", "long", remarks)] if any(remarks) else columns)
-
-
-def _remarks(dataset: xarray.Dataset) -> list[str]:
-    varied = spelt(str(dataset.attrs["free"]))
-    doubt = dataset["event_uncertainty"].to_numpy()
-    texts = [
-        dataset["event_extreme"].to_numpy() if "event_extreme" in dataset else np.full(doubt.shape, ""),
-        dataset["event_criticality"].to_numpy(),
-        [f"± {value:.0e} in {varied}" if value else "" for value in doubt],
-        [f"contact: {contact}" if str(contact) else "" for contact in dataset["event_contact"].to_numpy()],
-    ]
-    return ["; ".join(filter(None, map(str, words))) for words in zip(*texts, strict=True)]
-
-
-def notes_on(dataset: xarray.Dataset) -> list[str]:
-    """What the reader must know: warnings, and what stayed unsettled."""
-    notes = [note for note in str(dataset.attrs.get("warnings", "")).splitlines() if note.strip()]
-    if "multiplier_errors" in dataset and dataset.sizes.get("multiplier"):
-        near = np.abs(np.abs(dataset["multipliers"].to_numpy()) - 1.0) <= dataset["multiplier_errors"].to_numpy()
-        which = "a multiplier"
-        if is_boundary(dataset):  # one of them, or a pair, is on the circle all along
-            near &= ~_critical_multipliers(dataset)
-            which = "a multiplier besides the critical one"
-        open_points = int(np.count_nonzero(near.any(axis=1)))
-        if open_points:
-            notes.append(
-                f"Unsettled: at {open_points} of {near.shape[0]} points {which} is closer to the unit circle than "
-                "its estimated error, so that the verdict there could be the other one."
-            )
-    doubtful = int(np.count_nonzero(dataset["event_uncertainty"].to_numpy() > 0.0))
-    if doubtful:
-        what = "bifurcation is" if doubtful == 1 else "bifurcations are"
-        notes.append(f"{doubtful} {what} located to a stated uncertainty: see the remarks in the table.")
-    return notes
-
-
-def _critical_multipliers(dataset: xarray.Dataset) -> np.ndarray:
-    """Which multipliers are those that make the points bifurcations, (points, multipliers), bool: one at LP, BP and PD,
-    a pair at NS, none at grazings.
-    """
-    mu, row = dataset["multipliers"].to_numpy(), KINDS[kind_of(dataset)]
-    # a pair that becomes real in a resonance is at the circle still
-    distance = np.abs(np.abs(mu) - 1.0) if row.multiplier is None else np.abs(mu - row.multiplier)
-    nearest = np.argsort(np.where(np.isnan(distance), np.inf, distance), axis=1, kind="stable")[:, : row.critical]
-    critical = np.zeros(mu.shape, dtype=bool)
-    np.put_along_axis(critical, nearest, True, axis=1)
-    return critical
-
-
-def origin_of(dataset: xarray.Dataset) -> list[tuple[str, str]]:
-    """Where the numbers of a curve come from, by name."""
-    attrs = dataset.attrs
-    free = plane_of(dataset) if is_boundary(dataset) else (str(attrs["free"]),)
-    # omega that does not change although it is free stands at its points
-    fixed = [f"{n} = {v:.9g}" for n, v in fixed_parameters(dataset).items() if n not in map(spelt, free)]
-    pairs = [
-        ("computed by", f"suboctave {attrs.get('suboctave', '(unknown version)')}"),
-        ("system", str(attrs.get("system") or "(no name)")),
-        ("degrees of freedom", f"{attrs.get('dofs', 1)}, observed: {attrs.get('observed_dof', 0)}"),
-        ("free parameter", " and ".join(map(spelt, free))),
-        ("fixed parameters", ", ".join(fixed) or "none"),
-    ]
-    if "harmonics" in dataset:
-        used = dataset["harmonics"].to_numpy()
-        pairs.append(("harmonics used", f"{used.min()} to {used.max()}" if np.ptp(used) else f"{used[0]}"))
-    for name, words in (("error", "largest neglected part of the motion"), ("residual", "largest residual")):
-        if name in dataset:
-            pairs.append((words, _small(float(np.nanmax(dataset[name].to_numpy())))))
-    if "stability_method" in dataset:
-        methods = dict.fromkeys(str(method) for method in dataset["stability_method"].to_numpy())
-        pairs.append(("stability from", "; ".join(methods)))
-    return pairs + [*filter(_fits, _attributes(dataset))]
-
-
-def records_of(dataset: xarray.Dataset) -> list[tuple[str, str]]:
-    """Attributes of a curve that are too long for a line, by name."""
-    return [pair for pair in _attributes(dataset) if not _fits(pair)]
-
-
-def _fits(pair: tuple[str, str]) -> bool:
-    return len(pair[1]) <= _LONG and "\n" not in pair[1]
-
-
-def _attributes(dataset: xarray.Dataset) -> list[tuple[str, str]]:
-    """The attributes of a curve that have no place elsewhere, as texts."""
-    seconds = float(dataset.attrs.get("seconds", math.nan))
-    taken = [("time taken", f"{seconds:.3g} s")] if math.isfinite(seconds) else []
-    return taken + [(str(name), str(v)) for name, v in dataset.attrs.items() if name not in _PLACED and str(v)]
-
-
-def isolas_table(head: xarray.Dataset) -> Table | None:
-    """One row for each isola; None where there are none."""
-    if not head.sizes["isola"]:
-        return None
-    headings = (f"{parameter_of(head)} from", "to", "born at", "ω", "merges at", "ω")
-    keys = ("from", "to", "born", "born_omega", "merges", "merges_omega")
-    return Table(
-        [
-            ("isola", "", [str(i) for i in range(head.sizes["isola"])]),
-            ("period", _TEXT, [period_name(int(nu)) for nu in head["period"].to_numpy()]),
-            *((name, "", _texts(head[key].to_numpy())) for name, key in zip(headings, keys, strict=True)),
-        ]
-    )
-
-
-def notes_on_isolas(head: xarray.Dataset) -> tuple[list[str], list[str]]:
-    """What happens at the ends of isolas, and what stayed open."""
-    name = parameter_of(head)
-    sentences = [
-        f"Isola {number}, {name} = {float(head[key][number]):.7g}: {reason}."
-        for number in range(head.sizes["isola"])
-        for key in ("from", "to")
-        for reason in [head[f"at_{key}"].to_numpy()[number]]
-    ]
-    notes = [f"Isola {i}: {note}" for i, text in enumerate(head["notes"].to_numpy()) for note in str(text).splitlines()]
-    return sentences, notes + str(head.attrs.get("notes", "")).splitlines()
-
-
-def columns_of(dataset: xarray.Dataset) -> Table:
-    """A result that is no curve: its columns as they are."""
-    columns = {str(name): data.to_numpy() for name, data in dataset.data_vars.items() if data.dims == ("row",)}
-    return Table([(n, _TEXT if c.dtype.kind in "OU" else "", [_cell(v) for v in c]) for n, c in columns.items()])
-
-
-def _texts(values: np.ndarray, digits: int = 9) -> list[str]:
-    return [f"{value:.{digits}g}" if np.isfinite(value) else "–" for value in values]
-
-
-def _cell(value: Any) -> str:
-    if isinstance(value, complex | np.complexfloating):
-        return _number(complex(value))
-    return f"{float(value):.9g}" if isinstance(value, float | np.floating) else str(value)
-
-
-def _number(value: complex) -> str:
-    """A complex number, its imaginary part where it has one."""
-    if not np.isfinite(value):
-        return "–"
-    return f"{value.real:.6f}" + (f" {value.imag:+.6f}i" if abs(value.imag) > 1e-7 else "")
-
-
-def _small(value: float) -> str:
-    """A residual or an error."""
-    return f"{value:.1e}" if math.isfinite(value) else "–"
+def _attention(sections: Sequence[Section], found: Found) -> Iterator[tuple[str, str]]:
+    """What the reader must know before believing the numbers, each with where it is said at length."""
+    for section in sections:
+        for note in section.notes:
+            yield f"{section.heading}: {note}", section.anchor
+        for curve in section.curves:
+            name = found.curves[number_of(curve.dataset)]["name"]
+            for note in notes_on(curve.dataset):
+                yield f"{name}: {note}", curve.anchor
+    for number, verified in found.verified.items():
+        if verified.wrong:
+            yield f"{found.curves[number]['name']}: shooting disagrees at {verified.wrong} places", f"curve-{number}"
+    counts = [(data.sizes["point"], number_of(data)) for data in found.every if number_of(data) >= 0]
+    total = sum(count for count, _ in counts)
+    checked = sum(len(verified.points) for verified in found.verified.values())
+    if total > checked:
+        words = "no point was" if not checked else f"{checked} of {total} points were"
+        yield f'{words} held against time integration (the analysis "verify", so.verify)', ""

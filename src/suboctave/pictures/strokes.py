@@ -288,6 +288,7 @@ def add_strokes(
         at = stroke.at if floor is None else np.vstack([stroke.at[:2], np.full(stroke.at.shape[1], floor)])
         role, name, group = seen[stroke.stable]
         drawn: dict[str, Any] = {"smooth": earlier is not None, "role": role, "layer": layer}
+        drawn |= {"curve": number_of(dataset), "vertices": np.where(stroke.event >= 0, -1 - stroke.event, stroke.point)}
         own = pen.along(stroke.stable if floor is None else None)
         texts = partial(hover, stroke.point, stroke.event)
         frame.items.append(Polyline(at, own, name=name, group=group, hover=texts, **drawn))
@@ -305,11 +306,14 @@ def events_of(
     for kind, look, every in style.marks(dataset):
         which = every[marked[every]]
         if which.size:
-            yield (
-                kind,
-                look,
-                {"at": places[:, which], "role": kind, "hover": partial(hover, np.full(which.size, -1), which)},
-            )
+            words = partial(hover, np.full(which.size, -1), which)
+            placed = {"at": places[:, which], "role": kind, "hover": words}
+            yield kind, look, {**placed, "curve": number_of(dataset), "vertices": -1 - which}
+
+
+def number_of(dataset: xarray.Dataset) -> int:
+    """The number of a curve on the page that it is drawn for; -1 elsewhere."""
+    return int(dataset.attrs.get("number", -1))
 
 
 # ---------------------------------------------------------------------------------------------------------------- words

@@ -239,14 +239,17 @@ class Branch(CurveTables, BranchReadings):
         """How many harmonics are unknowns at each point: all up to the highest, shape (len,), int."""
         return self.harmonics
 
-    def to_xarray(self, readings: Iterable[str] | bool = False) -> xarray.Dataset:
+    def to_xarray(self, readings: Iterable[str] | bool = False, motions: bool = False) -> xarray.Dataset:
         """The branch as a labelled dataset: points, events, and what produced them.
 
-        `readings`: names of read-offs to add (see `reading`), or True for all of `available_readings`.
+        `readings`: names of read-offs to add (see `reading`), or True for all of `available_readings`. `motions`: with
+        the Fourier coefficients of the motions (`suboctave.store.motions.with_motions`).
         """
         from suboctave.store.layout import branch_dataset, events_met
+        from suboctave.store.motions import with_motions
 
-        return with_readings(branch_dataset(self), self, events_met(self), readings)
+        dataset = with_readings(branch_dataset(self), self, events_met(self), readings)
+        return with_motions(dataset, self) if motions else dataset
 
     def to_dataframe(self, readings: Iterable[str] | bool = False) -> pandas.DataFrame:
         """One row per point: free parameters, amplitude, stability, leading multiplier, errors; read-offs on request.

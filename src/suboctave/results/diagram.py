@@ -208,7 +208,7 @@ class BifurcationDiagram(CurveTables):
         ]
         return pd.concat([frame for frame in frames if len(frame)] or frames[:1], ignore_index=True)
 
-    def to_xarray(self, readings: Iterable[str] | bool = False) -> dict[str, xarray.Dataset]:
+    def to_xarray(self, readings: Iterable[str] | bool = False, motions: bool = False) -> dict[str, xarray.Dataset]:
         """The datasets of all branches (`Branch.to_xarray`) by number and label: "1: 2T, PD 3.99 to PD 2.30".
 
         A read-off such as "harmonic_0.5" is left out of branches whose motions have no such component.
@@ -216,7 +216,7 @@ class BifurcationDiagram(CurveTables):
         nodes = [node for node in self if len(node.branch)]
         chosen = shared(readings, [node.branch.nu for node in nodes])
         return {
-            f"{node.number}: {node.label}": node.branch.to_xarray(names)
+            f"{node.number}: {node.label}": node.branch.to_xarray(names, motions)
             for node, names in zip(nodes, chosen, strict=True)
         }
 

@@ -15,6 +15,9 @@ Variables: `displacement`, `velocity`, `acceleration` on `sample` and, with the 
 `amplitude_of_neglected`, the first-order answer to the force of the solved motion; `force` (element x sample), of the
 law; `gap_level` the place of a gap as a value of x, `gap_element` whose it is; `parameters`. Attributes: `omega`,
 `period` (nu), `dof`, `dofs`, `amplitude` (max |x|), `kind` (that of a bifurcation, else empty), `system`.
+
+All motions of a curve are laid out beside its points and events (`with_motions`), their coefficients with zeros behind
+those of fewer harmonics.
 """
 
 from __future__ import annotations
@@ -25,12 +28,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from suboctave.bifurcation.gaps import contact_side
 from suboctave.errors import InputError, chosen_dof
+from suboctave.harmonic.basis import Array, to_real
 from suboctave.harmonic.orbit import PeriodicOrbit, force_along
 from suboctave.model.elements.coupled import reads
 from suboctave.model.elements.smoothness import levels
 from suboctave.model.inputs import check_element
-from suboctave.store.layout import LAYOUT, check_layout
+from suboctave.store.layout import LAYOUT, check_layout, events_met
+from suboctave.store.plain import padded
 from suboctave.version import __version__
 
 if TYPE_CHECKING:
@@ -148,11 +154,9 @@ def motion_dataset(
     variables |= {f"section_{name}": ("section", values[sections]) for name, values in series.items()}
     variables["amplitude_of_component"] = ("component", c)
     state = orbit.state()
-    unit = np.zeros(system.n)
-    unit[chosen] = 1.0
     beyond = (high + 1.0 + np.arange(high + 1)) / nu * orbit.omega
     lacking = state.linear.recovered(beyond, state.neglected)
-    variables["amplitude_of_neglected"] = ("neglected", lacking @ state.linear.seen(unit))
+    variables["amplitude_of_neglected"] = ("neglected", lacking @ state.linear.seen(_unit(system.n, chosen)))
     wanted = [check_element(system, index) for index in elements]
     force = [force_along(state, index)(tau) for index in wanted]
     variables["force"] = (("element", "sample"), np.reshape(force, (len(wanted), count + 1)))
@@ -192,3 +196,70 @@ def motion_dataset(
         "error": float(orbit.truncation),
     }
     return xarray.Dataset(variables, coords, attributes)
+
+
+# ----------------------------------------------------------------------------------------------- all motions of a curve
+#: gaps whose contacts are laid out; those of further elements are left out
+_GAPS = 12
+
+
+def with_motions(dataset: xarray.Dataset, branch: Any) -> xarray.Dataset:
+    """The dataset of a branch with the motions at its points and, with the prefix `event_`, at its events.
+
+    Variables: `motion` (point x signal x motion_coefficient), a_0, a_1, b_1, ... of `signal` 0, the observed degree of
+    freedom, and of the displacements that elements with gaps read; `gap_level` (point x gap), where contact begins,
+    `gap_signal`, `gap_side` (+1: in contact above it) and `gap_label` (gap,); `event_harmonics`, `event_error`,
+    `event_multipliers` of events.
+    """
+    if not len(branch):
+        return dataset
+    events = [event for event in events_met(branch) if event.orbit is not None]
+    orbits, met = list(branch.orbits), [event.orbit for event in events]
+    first, n = orbits[0], branch.system.n
+    signals = [_unit(n, branch.observe)]
+    gaps: list[tuple[int, int, int, int, str]] = []
+    for index, element in enumerate(first.balance.system.elements):
+        places = _levels(first, index)
+        if not places or len(gaps) + len(places) > _GAPS:
+            continue
+        direction = np.asarray(reads(element, n), dtype=float)
+        same = [i for i, signal in enumerate(signals) if np.array_equal(signal, direction)]
+        if not same:
+            signals.append(direction)
+        which, local = same[0] if same else len(signals) - 1, first.state().local(index)
+        gaps += [(index, place, which, contact_side(local, place), element.label) for place in range(len(places))]
+    added: dict[str, Any] = {
+        "gap_signal": ("gap", np.array([gap[2] for gap in gaps], dtype=int)),
+        "gap_side": ("gap", np.array([gap[3] for gap in gaps], dtype=int)),
+        "gap_label": ("gap", np.array([gap[4] for gap in gaps], dtype=object)),
+        "event_harmonics": ("event", np.array([orbit.basis.harmonics for orbit in met], dtype=int)),
+        "event_error": ("event", np.array([orbit.truncation for orbit in met], dtype=float)),
+        "event_multipliers": (
+            ("event", "event_floquet"),
+            padded([event.multipliers for event in events], complex),
+        ),
+    }
+    for prefix, axis, own in (("", "point", orbits), ("event_", "event", met)):
+        size = max((orbit.basis.size for orbit in own), default=1)
+        table = np.zeros((len(own), len(signals), size))
+        levels_there = np.full((len(own), len(gaps)), np.nan)
+        for row, orbit in enumerate(own):
+            for i, direction in enumerate(signals):
+                table[row, i, : orbit.basis.size] = to_real(orbit.along(direction))
+            known = {index: _levels(orbit, index) for index in {gap[0] for gap in gaps}}
+            levels_there[row] = [known[gap[0]][gap[1]] for gap in gaps]
+        added[f"{prefix}motion"] = ((axis, "signal", f"{prefix}motion_coefficient"), table)
+        added[f"{prefix}gap_level"] = ((axis, "gap"), levels_there)
+    return dataset.assign(added)
+
+
+def _unit(n: int, dof: int) -> Array:
+    direction = np.zeros(n)
+    direction[dof] = 1.0
+    return direction
+
+
+def _levels(orbit: PeriodicOrbit, element: int) -> tuple[float, ...]:
+    """Displacements at which an element's law has a corner, or is sharp, at a motion's parameters."""
+    law = orbit.balance.laws(orbit.values).members[element]
+    return levels(law.kind, law.coefficients)

@@ -343,7 +343,7 @@ class Isolas(Stored, Sequence[Isola]):
     def _curves(self) -> tuple[TrackedBranch, ...]:
         return (*self.limit_points, *self.doublings)
 
-    def to_xarray(self, readings: Iterable[str] | bool = False) -> dict[str, xarray.Dataset]:
+    def to_xarray(self, readings: Iterable[str] | bool = False, motions: bool = False) -> dict[str, xarray.Dataset]:
         """Datasets by name: "isolas" (one entry each, and their edges), all curves, the closed branches known.
 
         `suboctave.store.layout` describes the first, `Branch.to_xarray` the others.
@@ -359,7 +359,7 @@ class Isolas(Stored, Sequence[Isola]):
                 named[f"{which} at {self.parameter} = {value:.6g}"] = (branch, {"isola": number, "at": value})
         chosen = shared(readings, [branch.nu for branch, _ in named.values()])
         return {"isolas": head_dataset(self)} | {
-            name: branch.to_xarray(names).assign_attrs(attributes)
+            name: branch.to_xarray(names, motions).assign_attrs(attributes)
             for (name, (branch, attributes)), names in zip(named.items(), chosen, strict=True)
         }
 

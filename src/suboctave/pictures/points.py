@@ -1,0 +1,141 @@
+"""What a report page knows of the points and events of its curves beside where they are drawn, as data for its scripts.
+
+Numbers are packed: little-endian, base64. The Fourier coefficients of the motions come along, of which the page makes
+time histories, phase portraits and spectra.
+"""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from suboctave.pictures import style
+from suboctave.pictures.boundary import is_boundary, kind_of, plane_of
+from suboctave.pictures.strokes import number_of
+from suboctave.pictures.style import period_of
+from suboctave.store.layout import coordinate
+
+if TYPE_CHECKING:
+    import xarray
+
+
+#: multipliers of a point that are shown, by falling modulus
+_MULTIPLIERS = 24
+
+
+@dataclass(frozen=True)
+class Verified:
+    """What shooting said of a curve: of points by index and of events by number, each in words; how many disagree."""
+
+    points: dict[int, str] = field(default_factory=dict)
+    events: dict[int, str] = field(default_factory=dict)
+    wrong: int = 0
+
+
+def curve_data(dataset: xarray.Dataset, name: str, verified: Verified | None = None) -> dict[str, Any]:
+    """A curve with everything that a panel shows of its points and events; `name`: what the page calls it."""
+    free = plane_of(dataset) if is_boundary(dataset) else (str(dataset.attrs["free"]),)
+    names = list(dict.fromkeys([*free, "omega", *(str(one) for one in dataset["parameter"].to_numpy())]))
+    values = {one: coordinate(dataset, one) for one in names}
+    varied = [one for one in names if one in free or one == "omega" or np.ptp(values[one][0]) > 0.0]
+    kinds = [str(kind) for kind in dataset["event_kind"].to_numpy()]
+    verified = verified or Verified()
+    return {
+        "number": number_of(dataset),
+        "name": name,
+        "free": list(free),
+        "tracked": kind_of(dataset) if is_boundary(dataset) else "",
+        "nu": period_of(dataset),
+        "dof": int(dataset.attrs.get("observed_dof", 0)) if int(dataset.attrs.get("dofs", 1)) > 1 else None,
+        "fixed": {one: float(values[one][0][0]) for one in names if one not in varied},
+        "points": _places(dataset, "", {one: values[one][0] for one in varied}),
+        "events": {
+            **_places(dataset, "event_", {one: values[one][1] for one in varied}),
+            "kind": kinds,
+            "words": [style.kind_style(kind).name for kind in kinds],
+            "after": dataset["event_after"].to_numpy().tolist(),
+            "criticality": [str(word) for word in dataset["event_criticality"].to_numpy()],
+            "contact": [str(word) for word in dataset["event_contact"].to_numpy()],
+            "uncertainty": _finite(dataset["event_uncertainty"].to_numpy()),
+        },
+        "gaps": _gaps(dataset),
+        "verified": {str(index): words for index, words in verified.points.items()},
+        "verified_events": {str(index): words for index, words in verified.events.items()},
+    }
+
+
+def verified_by(checks: Sequence[xarray.Dataset], dataset: xarray.Dataset) -> Verified | None:
+    """What verifications say of a curve; None where none was of it."""
+    omega, amplitude = dataset["omega"].to_numpy(), dataset["amplitude"].to_numpy()
+    found: Verified | None = None
+    for check in checks:
+        index = check["index"].to_numpy().astype(int)
+        there = np.array([check["omega"].to_numpy(), check["amplitude"].to_numpy()])
+        if index.size and (index.max() >= omega.size or not np.allclose(there, [omega[index], amplitude[index]])):
+            continue
+        events: dict[int, str] = {}
+        met, seen = ([data[f"event_{name}"].to_numpy() for name in ("omega", "amplitude")] for data in (dataset, check))
+        for i, place in enumerate(zip(*seen, strict=True)):
+            same = np.flatnonzero(np.all(np.isclose(np.transpose(met), place, rtol=1e-9), axis=1))
+            words = "confirmed" if bool(check["event_agrees"][i]) else "NOT CONFIRMED"
+            events |= {int(e): f"{words}; distance {float(check['event_distance'][i]):.1e}" for e in same[:1]}
+        if not index.size and not events:
+            continue
+        outcome, distance = check["outcome"].to_numpy(), check["distance"].to_numpy()
+        points = {
+            int(at): f"{words}; distance {far:.1e}" for at, words, far in zip(index, outcome, distance, strict=True)
+        }
+        wrong = int(np.count_nonzero(outcome == "disagrees")) + sum(word.startswith("NOT") for word in events.values())
+        before = found or Verified()
+        found = Verified(before.points | points, before.events | events, before.wrong + wrong)
+    return found
+
+
+def _places(dataset: xarray.Dataset, prefix: str, values: dict[str, np.ndarray]) -> dict[str, Any]:
+    """The points of a curve, or with `prefix` its events."""
+    count = dataset.sizes["event" if prefix else "point"]
+    data: dict[str, Any] = {"count": count, "values": {name: packed(column) for name, column in values.items()}}
+    data |= {
+        name: packed(dataset[f"{prefix}{name}"].to_numpy())
+        for name in ("amplitude", "residual", "error")
+        if f"{prefix}{name}" in dataset
+    }
+    if not prefix and "stable" in dataset:
+        data["stable"] = packed(dataset["stable"].to_numpy(), "u1")
+    if f"{prefix}harmonics" in dataset:
+        data["harmonics"] = packed(dataset[f"{prefix}harmonics"].to_numpy(), "<i4")
+    if f"{prefix}multipliers" in dataset:
+        rows = dataset[f"{prefix}multipliers"].to_numpy()[:, :_MULTIPLIERS]
+        data |= {"multipliers": packed(np.stack([rows.real, rows.imag], axis=-1), "<f4"), "of_each": rows.shape[1]}
+    elif prefix:
+        rows = dataset["event_multiplier"].to_numpy()
+        data |= {"multipliers": packed(np.stack([rows.real, rows.imag], axis=-1), "<f4"), "of_each": 1}
+    if f"{prefix}motion" in dataset:
+        sizes = 2 * dataset[f"{prefix}harmonics"].to_numpy() + 1
+        table = dataset[f"{prefix}motion"].to_numpy()
+        # one motion after the other, each without the zeros behind it
+        own = [row[:, :size].ravel() for row, size in zip(table, sizes, strict=True)]
+        data["motion"] = packed(np.concatenate([np.zeros(0), *own]), "<f4")
+        data["levels"] = packed(dataset[f"{prefix}gap_level"].to_numpy())
+    return data
+
+
+def _gaps(dataset: xarray.Dataset) -> dict[str, Any]:
+    """Where contact begins: which displacement counts, on which side there is contact, of which element."""
+    if "motion" not in dataset:
+        return {"signals": 1, "signal": [], "side": [], "label": []}
+    own = {name: dataset[f"gap_{name}"].to_numpy().tolist() for name in ("signal", "side", "label")}
+    return {"signals": dataset.sizes["signal"], **own}
+
+
+def packed(values: np.ndarray, kind: str = "<f8") -> str:
+    """An array as base64."""
+    return base64.b64encode(np.ascontiguousarray(values, dtype=kind).tobytes()).decode("ascii")
+
+
+def _finite(values: np.ndarray) -> list[float | None]:
+    return [float(value) if np.isfinite(value) else None for value in values]

@@ -1,0 +1,232 @@
+"""What a report page says of results beside figures: tables, sentences, notes, origins, as plain texts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from suboctave.kinds import KINDS
+from suboctave.pictures import style
+from suboctave.pictures.boundary import is_boundary, kind_of, parameter_of, plane_of
+from suboctave.pictures.strokes import fixed_parameters, number_of, spelt
+from suboctave.pictures.style import period_name, period_of
+from suboctave.store.layout import coordinate, parameter_column
+
+if TYPE_CHECKING:
+    import xarray
+
+
+_TEXT = "text"
+#: attributes of a dataset that have a place of their own on the page, or none
+_PLACED = {"layout", "suboctave", "system", "free", "ended", "closed", "period", "observed_dof", "dofs", "warnings"}
+_PLACED |= {"record", "digest", "contents", "tracked", "plane", "isola", "at", "seconds", "number"}
+#: characters of an attribute from which it is folded away, and of a row of a table that stands beside its figure
+_LONG, _BESIDE = 400, 56
+
+
+@dataclass(frozen=True)
+class Table:
+    """Columns: heading, class ("", "text", "long"), and the cells; `places`: of rows that are points or events of a
+    curve which, "curve:vertex", as in `drawing`.
+    """
+
+    columns: Sequence[tuple[str, str, Sequence[str]]]
+    places: Sequence[str] = ()
+
+    @property
+    def rows(self) -> list[tuple[str, ...]]:
+        """The cells row by row."""
+        return list(zip(*(cells for _, _, cells in self.columns), strict=True))
+
+    @property
+    def wide(self) -> bool:
+        """Whether there is no room for it beside a figure."""
+        return sum(max(map(len, (heading, *cells))) for heading, _, cells in self.columns) > _BESIDE
+
+
+def summary_of(dataset: xarray.Dataset) -> str:
+    """How many points a curve has, how many of them are unstable, of which period, and why it ends."""
+    count, unstable, nu = dataset.sizes["point"], "", period_of(dataset)
+    bounds = is_boundary(dataset)
+    if "stable" in dataset:
+        number = int(np.count_nonzero(~dataset["stable"].to_numpy().astype(bool)))
+        unstable = f", {number} within unstable motions" if bounds else f", {number} of them unstable"
+    kind = kind_of(dataset) if bounds else ""
+    begin = f"curve of bifurcations of the kind {kind} ({style.kind_style(kind).name}): " if bounds else ""
+    motions = f"; motions of {nu} periods of the force" if nu > 1 else ""
+    ended = f"; {dataset.attrs['ended']}" if dataset.attrs.get("ended") else ""
+    return f"{begin}{count} points{unstable}{motions}{ended}"
+
+
+def bifurcations(dataset: xarray.Dataset) -> Table:
+    """The located events of a curve, in the order met."""
+    names = plane_of(dataset) if is_boundary(dataset) else (str(dataset.attrs["free"]),)
+    own, remarks = ("kind", "ω", "max |x|", "multiplier", "residual", "remark"), _remarks(dataset)
+    kinds, omega, amplitude, multiplier, residual = (
+        dataset[f"event_{name}"].to_numpy() for name in ("kind", "omega", "amplitude", "multiplier", "residual")
+    )
+    words = [(kind, style.kind_style(kind).name) for kind in map(str, kinds)]
+    columns: list[tuple[str, str, Sequence[str]]] = [
+        ("kind", _TEXT, [f"{k} ({n})" if k.isupper() and n != k else n for k, n in words]),
+        ("ω", "", _texts(omega)),
+        *((parameter_column(n, own), "", _texts(coordinate(dataset, n)[1])) for n in names if n != "omega"),
+        ("max |x|", "", _texts(amplitude, 7)),
+        ("multiplier", "", [_number(complex(mu)) for mu in multiplier]),
+        ("residual", "", [_small(value) for value in residual]),
+    ]
+    number = number_of(dataset)
+    places = [f"{number}:{-1 - event}" for event in range(len(kinds))] if number >= 0 else []
+    return Table([*columns, ("remark", "long", remarks)] if any(remarks) else columns, places)
+
+
+def _remarks(dataset: xarray.Dataset) -> list[str]:
+    varied = spelt(str(dataset.attrs["free"]))
+    doubt = dataset["event_uncertainty"].to_numpy()
+    texts = [
+        dataset["event_extreme"].to_numpy() if "event_extreme" in dataset else np.full(doubt.shape, ""),
+        dataset["event_criticality"].to_numpy(),
+        [f"± {value:.0e} in {varied}" if value else "" for value in doubt],
+        [f"contact: {contact}" if str(contact) else "" for contact in dataset["event_contact"].to_numpy()],
+    ]
+    return ["; ".join(filter(None, map(str, words))) for words in zip(*texts, strict=True)]
+
+
+def notes_on(dataset: xarray.Dataset) -> list[str]:
+    """What the reader must know: warnings, and what stayed unsettled."""
+    notes = [note for note in str(dataset.attrs.get("warnings", "")).splitlines() if note.strip()]
+    if "multiplier_errors" in dataset and dataset.sizes.get("multiplier"):
+        near = np.abs(np.abs(dataset["multipliers"].to_numpy()) - 1.0) <= dataset["multiplier_errors"].to_numpy()
+        which = "a multiplier"
+        if is_boundary(dataset):  # one of them, or a pair, is on the circle all along
+            near &= ~_critical_multipliers(dataset)
+            which = "a multiplier besides the critical one"
+        open_points = int(np.count_nonzero(near.any(axis=1)))
+        if open_points:
+            notes.append(
+                f"Unsettled: at {open_points} of {near.shape[0]} points {which} is closer to the unit circle than "
+                "its estimated error, so that the verdict there could be the other one."
+            )
+    doubtful = int(np.count_nonzero(dataset["event_uncertainty"].to_numpy() > 0.0))
+    if doubtful:
+        what = "bifurcation is" if doubtful == 1 else "bifurcations are"
+        notes.append(f"{doubtful} {what} located to a stated uncertainty: see the remarks in the table.")
+    return notes
+
+
+def _critical_multipliers(dataset: xarray.Dataset) -> np.ndarray:
+    """Which multipliers are those that make the points bifurcations, (points, multipliers), bool: one at LP, BP and PD,
+    a pair at NS, none at grazings.
+    """
+    mu, row = dataset["multipliers"].to_numpy(), KINDS[kind_of(dataset)]
+    # a pair that becomes real in a resonance is at the circle still
+    distance = np.abs(np.abs(mu) - 1.0) if row.multiplier is None else np.abs(mu - row.multiplier)
+    nearest = np.argsort(np.where(np.isnan(distance), np.inf, distance), axis=1, kind="stable")[:, : row.critical]
+    critical = np.zeros(mu.shape, dtype=bool)
+    np.put_along_axis(critical, nearest, True, axis=1)
+    return critical
+
+
+def origin_of(dataset: xarray.Dataset) -> list[tuple[str, str]]:
+    """Where the numbers of a curve come from, by name."""
+    attrs = dataset.attrs
+    free = plane_of(dataset) if is_boundary(dataset) else (str(attrs["free"]),)
+    # omega that does not change although it is free stands at its points
+    fixed = [f"{n} = {v:.9g}" for n, v in fixed_parameters(dataset).items() if n not in map(spelt, free)]
+    pairs = [
+        ("computed by", f"suboctave {attrs.get('suboctave', '(unknown version)')}"),
+        ("system", str(attrs.get("system") or "(no name)")),
+        ("degrees of freedom", f"{attrs.get('dofs', 1)}, observed: {attrs.get('observed_dof', 0)}"),
+        ("free parameter", " and ".join(map(spelt, free))),
+        ("fixed parameters", ", ".join(fixed) or "none"),
+    ]
+    if "harmonics" in dataset:
+        used = dataset["harmonics"].to_numpy()
+        pairs.append(("harmonics used", f"{used.min()} to {used.max()}" if np.ptp(used) else f"{used[0]}"))
+    for name, words in (("error", "largest neglected part of the motion"), ("residual", "largest residual")):
+        if name in dataset:
+            pairs.append((words, _small(float(np.nanmax(dataset[name].to_numpy())))))
+    if "stability_method" in dataset:
+        methods = dict.fromkeys(str(method) for method in dataset["stability_method"].to_numpy())
+        pairs.append(("stability from", "; ".join(methods)))
+    return pairs + [*filter(_fits, _attributes(dataset))]
+
+
+def records_of(dataset: xarray.Dataset) -> list[tuple[str, str]]:
+    """Attributes of a curve that are too long for a line, by name."""
+    return [pair for pair in _attributes(dataset) if not _fits(pair)]
+
+
+def _fits(pair: tuple[str, str]) -> bool:
+    return len(pair[1]) <= _LONG and "\n" not in pair[1]
+
+
+def _attributes(dataset: xarray.Dataset) -> list[tuple[str, str]]:
+    """The attributes of a curve that have no place elsewhere, as texts."""
+    seconds = float(dataset.attrs.get("seconds", math.nan))
+    taken = [("time taken", f"{seconds:.3g} s")] if math.isfinite(seconds) else []
+    return taken + [(str(name), str(v)) for name, v in dataset.attrs.items() if name not in _PLACED and str(v)]
+
+
+def isolas_table(head: xarray.Dataset, closed: Mapping[str, xarray.Dataset] | None = None) -> Table | None:
+    """One row for each isola, which leads to the first of its closed branches; None where there are none."""
+    if not head.sizes["isola"]:
+        return None
+    headings = (f"{parameter_of(head)} from", "to", "born at", "ω", "merges at", "ω")
+    keys = ("from", "to", "born", "born_omega", "merges", "merges_omega")
+    places = [""] * head.sizes["isola"]
+    for dataset in reversed([*(closed or {}).values()]):
+        highest = int(np.argmax(dataset["amplitude"].to_numpy()))
+        places[int(dataset.attrs["isola"])] = f"{number_of(dataset)}:{highest}"
+    return Table(
+        [
+            ("isola", "", [str(i) for i in range(head.sizes["isola"])]),
+            ("period", _TEXT, [period_name(int(nu)) for nu in head["period"].to_numpy()]),
+            *((name, "", _texts(head[key].to_numpy())) for name, key in zip(headings, keys, strict=True)),
+        ],
+        places,
+    )
+
+
+def notes_on_isolas(head: xarray.Dataset) -> tuple[list[str], list[str]]:
+    """What happens at the ends of isolas, and what stayed open."""
+    name = parameter_of(head)
+    sentences = [
+        f"Isola {number}, {name} = {float(head[key][number]):.7g}: {reason}."
+        for number in range(head.sizes["isola"])
+        for key in ("from", "to")
+        for reason in [head[f"at_{key}"].to_numpy()[number]]
+    ]
+    notes = [f"Isola {i}: {note}" for i, text in enumerate(head["notes"].to_numpy()) for note in str(text).splitlines()]
+    return sentences, notes + str(head.attrs.get("notes", "")).splitlines()
+
+
+def columns_of(dataset: xarray.Dataset) -> Table:
+    """A result that is no curve: its columns as they are."""
+    columns = {str(name): data.to_numpy() for name, data in dataset.data_vars.items() if data.dims == ("row",)}
+    return Table([(n, _TEXT if c.dtype.kind in "OU" else "", [_cell(v) for v in c]) for n, c in columns.items()])
+
+
+def _texts(values: np.ndarray, digits: int = 9) -> list[str]:
+    return [f"{value:.{digits}g}" if np.isfinite(value) else "–" for value in values]
+
+
+def _cell(value: Any) -> str:
+    if isinstance(value, complex | np.complexfloating):
+        return _number(complex(value))
+    return f"{float(value):.9g}" if isinstance(value, float | np.floating) else str(value)
+
+
+def _number(value: complex) -> str:
+    """A complex number, its imaginary part where it has one."""
+    if not np.isfinite(value):
+        return "–"
+    return f"{value.real:.6f}" + (f" {value.imag:+.6f}i" if abs(value.imag) > 1e-7 else "")
+
+
+def _small(value: float) -> str:
+    """A residual or an error."""
+    return f"{value:.1e}" if math.isfinite(value) else "–"

@@ -1,0 +1,192 @@
+// The panel: everything that is known of the chosen point of a curve.
+let chosen = null;
+const panel = document.getElementById("panel");
+
+function element(tag, text, attributes = {}) {
+  const made = document.createElement(tag);
+  if (text) { made.textContent = text; }
+  for (const [name, value] of Object.entries(attributes)) { made.setAttribute(name, value); }
+  return made;
+}
+
+function button(words, act, label) {
+  const made = element("button", words, { type: "button", ...(label ? { "aria-label": label } : {}) });
+  made.addEventListener("click", act);
+  return made;
+}
+
+function choose(number, vertex) {
+  const curve = curveOf(number);
+  if (!curve) { return; }
+  chosen = { curve: number, vertex };
+  const place = placeOf(curve, vertex);
+  open(vertex < 0 ? eventHeading(curve, -1 - vertex) : `Point ${vertex} of ${curve.points.count}`, curve.name);
+  const facts = factsOf(curve, vertex, place);
+  panel.append(listOf(facts), movesOf(curve));
+  const c = coefficients(place, 0);
+  if (c) { motionPictures(curve, place, c); } else {
+    panel.append(element("p", "The motions are not on this page: it was made from a dataset without them.", { class: "soft" }));
+  }
+  if (place.multipliers.length) { multiplierPicture(place); }
+  linksTo(neighbours(place.values, number));
+  markFigures();
+  markRows();
+  document.getElementById("spoken").textContent = `${curve.name}, ${facts.slice(0, 4).map((f) => f.join(" ")).join(", ")}`;
+}
+
+// A place in a map, which is on no curve: what is known there, and the curves near it.
+function choosePlace(x, y, words, across, upwards) {
+  chosen = null;
+  const parameter = (text) => (text === "ω" ? "omega" : text), values = { [parameter(across)]: x, [parameter(upwards)]: y };
+  open(words || "A place in the map", "");
+  panel.append(listOf([[across, shown(x, 6)], [upwards, shown(y, 6)]].map(([name, value]) => [name.replace(/<[^>]*>/g, ""), value])));
+  if (Object.keys(values).every((name) => name === "omega" || curves.some((curve) => name in curve.fixed || name in curve.points.values))) {
+    linksTo(neighbours(values, -1));
+  }
+  markFigures();
+  markRows();
+}
+
+function open(heading, name) {
+  panel.replaceChildren(button("×", close, "Close the panel"), element("h2", heading), element("p", name, { class: "soft" }));
+  panel.firstChild.className = "close";
+  const before = panel.hidden;
+  panel.hidden = false;
+  document.body.classList.add("chosen-point");
+  if (before) { window.dispatchEvent(new Event("resize")); }
+}
+
+function close() {
+  chosen = null;
+  panel.hidden = true;
+  document.body.classList.remove("chosen-point");
+  markFigures();
+  markRows();
+  window.dispatchEvent(new Event("resize"));
+}
+
+function eventHeading(curve, event) {
+  const { kind, words, criticality } = curve.events;
+  return [kind[event] === words[event] ? words[event] : `${kind[event]}: ${words[event]}`, criticality[event]].filter(Boolean).join(", ");
+}
+
+function factsOf(curve, vertex, place) {
+  const facts = [];
+  const names = [...new Set([...curve.free, "omega", ...Object.keys(place.places.values)])];
+  for (const name of names) { facts.push([spelt(name), shown(place.values[name])]); }
+  facts.push([curve.dof === null ? "max |x|" : `max |x_${curve.dof}|`, shown(place.amplitude, 7)]);
+  if (place.stable !== null) { facts.push(["stability", place.stable ? "stable" : "unstable"]); }
+  if (place.multipliers.length) {
+    const [re, im] = place.multipliers.reduce((a, b) => (Math.hypot(...b) > Math.hypot(...a) ? b : a));
+    facts.push(["largest multiplier", `${shown(re, 6)}${Math.abs(im) > 1e-7 ? ` ${im < 0 ? "−" : "+"} ${shown(Math.abs(im), 6)}i` : ""}`]);
+  }
+  facts.push(["residual", small(place.residual)], ["neglected part", small(place.error)]);
+  if (Number.isFinite(place.harmonics)) { facts.push(["harmonics", String(place.harmonics)]); }
+  facts.push(["period", curve.nu === 1 ? "T" : `${curve.nu}T`]);
+  if (vertex < 0 && curve.events.uncertainty[-1 - vertex]) { facts.push(["located to", `± ${small(curve.events.uncertainty[-1 - vertex])}`]); }
+  if (vertex < 0 && curve.events.contact[-1 - vertex]) { facts.push(["contact", curve.events.contact[-1 - vertex]]); }
+  const verified = vertex < 0 ? curve.verified_events[-1 - vertex] : curve.verified[vertex];
+  facts.push(["verification", verified || "not verified"]);
+  return facts;
+}
+
+function listOf(facts) {
+  const list = element("dl");
+  for (const [name, value] of facts) { list.append(element("dt", name), element("dd", value)); }
+  return list;
+}
+
+function movesOf(curve) {
+  const row = element("div", "", { class: "actions" });
+  row.append(button("← previous", () => goAlong(-1)), button("next →", () => goAlong(1)));
+  const place = placeOf(curve, chosen.vertex);
+  if (coefficients(place, 0)) { row.append(button("CSV", () => saveMotion(curve, place), "Save the motion as CSV")); }
+  return row;
+}
+
+function goAlong(step) {
+  const curve = curveOf(chosen.curve), { count } = curve.points;
+  let from = chosen.vertex;
+  if (from < 0) { from = curve.events.after[-1 - from] + (step > 0 ? 0 : 1); }
+  choose(chosen.curve, Math.max(0, Math.min(count - 1, from + step)));
+}
+
+function saveMotion(curve, place) {
+  const c = coefficients(place, 0), { t, x, v } = samples(c, curve.nu, place.omega);
+  save("motion.csv", csv([["t", "x", "dx/dt"], ...t.map((time, i) => [time, x[i], v[i]])]), "text/csv");
+}
+
+// ------------------------------------------------------------------------------------------------------ its pictures
+function picture(heading, words, data, layout, round) {
+  panel.append(element("h3", heading));
+  const plot = element("div", "", { class: round ? "small round" : "small", role: "img", "aria-label": words });
+  panel.append(plot);
+  const axis = { showline: true, zeroline: false, ticks: "outside", ticklen: 3, nticks: 6 };
+  const whole = layoutOn({ margin: { l: 52, r: 10, t: 6, b: 36 }, showlegend: false, hovermode: "closest",
+    font: { size: 11, family: "system-ui, Segoe UI, DejaVu Sans, Arial, sans-serif" }, ...layout,
+    xaxis: { ...axis, ...layout.xaxis }, yaxis: { ...axis, ...layout.yaxis } });
+  Plotly.newPlot(plot, data, whole, { responsive: true, displaylogo: false, plotlyServerURL: "", displayModeBar: false });
+}
+
+function motionPictures(curve, place, c) {
+  const { omega } = place, { nu } = curve, sampled = samples(c, nu, omega), { tau, x, v, count } = sampled;
+  const ink = dark() ? "#6cc1f5" : "#0072B2", soft = dark() ? "#a9adb3" : "#8c8c8c", line = { color: ink, width: 2 };
+  const touching = contacts(curve, place), own = touching.filter((one) => one.own);
+  const largest = peak(c, sampled), sub = curve.dof === null ? "x" : `x<sub>${curve.dof}</sub>`;
+  const across = tau.map((one) => (one * nu) / (2 * Math.PI));
+  const inside = own.filter((one) => Math.abs(one.level) <= 1.3 * largest);
+  const rule = (value, upright) => ({ type: "line", line: { color: soft, width: 1, dash: "dot" },
+    ...(upright ? { yref: "paper", y0: 0, y1: 1, x0: value, x1: value } : { xref: "paper", x0: 0, x1: 1, y0: value, y1: value }) });
+  panel.dataset.peak = String(largest);
+  picture("Time history", `Time history: largest |x| ${shown(largest, 7)}`,
+    [{ x: across, y: x, mode: "lines", line, hovertemplate: "t/T = %{x:.4f}<br>x = %{y:.6g}<extra></extra>" }],
+    { xaxis: { title: { text: "t/T" }, range: [0, nu] }, yaxis: { title: { text: sub } }, shapes: inside.map((one) => rule(one.level)) });
+  const strobe = Array.from({ length: nu }, (_, i) => (i * count) / nu);
+  picture("Phase portrait", "Phase portrait: velocity over displacement",
+    [{ x, y: v, mode: "lines", line, hoverinfo: "skip" },
+      { x: strobe.map((i) => x[i]), y: strobe.map((i) => v[i]), mode: "markers", marker: { color: ink, size: 8 },
+        hovertemplate: "phase 0: %{x:.6g}, %{y:.6g}<extra></extra>" }],
+    { xaxis: { title: { text: sub } }, yaxis: { title: { text: `d${sub}/dt` } }, shapes: inside.map((one) => rule(one.level, true)) }, true);
+  const sizes = [Math.abs(c[0])];
+  for (let k = 1; 2 * k < c.length; k++) { sizes.push(Math.hypot(c[2 * k - 1], c[2 * k])); }
+  const top = Math.max(...sizes), floor = Math.floor(Math.log10(top)) - 8;
+  const bars = sizes.map((size) => Math.max(0, Math.log10(size) - floor));
+  const whole = sizes.map((_, k) => k % nu === 0), far = Math.min(sizes.length - 1, 24 * nu);
+  picture("Spectrum", "Amplitudes of the harmonics, logarithmic",
+    [{ type: "bar", base: floor, x: sizes.map((_, k) => k / nu), y: bars, width: 0.5 / nu, marker: { color: whole.map((is) => (is ? ink : "#E69F00")) },
+      customdata: sizes, hovertemplate: "%{x:.4g} ω: %{customdata:.4g}<extra></extra>" }],
+    { xaxis: { title: { text: "frequency / ω" }, range: [-0.6, far / nu + 0.6] },
+      yaxis: { title: { text: "amplitude" }, range: [floor, floor + 9], tickvals: [0, 2, 4, 6, 8].map((i) => floor + i),
+        ticktext: [0, 2, 4, 6, 8].map((i) => `1e${floor + i}`) } });
+  panel.append(element("h3", "Contact"));
+  if (!touching.length) { panel.append(element("p", "no element has a gap", { class: "soft" })); }
+  for (const one of touching) {
+    const state = one.share === 0 ? "never touches" : one.share > 0.9999999 ? "touches always"
+      : `touches ${(100 * one.share).toFixed(1)} % of the period, ${one.begun} contact${one.begun === 1 ? "" : "s"} in it`;
+    panel.append(element("p", `${one.name} at ${shown(one.level, 5)}: ${state}`));
+  }
+}
+
+function multiplierPicture(place) {
+  const angles = Array.from({ length: 181 }, (_, i) => (2 * Math.PI * i) / 180), { ink } = looks[dark() ? "dark" : "light"];
+  const far = Math.max(1.25, 1.1 * Math.max(...place.multipliers.map((mu) => Math.hypot(...mu))));
+  const out = place.multipliers.map((mu) => Math.hypot(...mu) > 1);
+  picture("Multipliers", "Floquet multipliers and the unit circle",
+    [{ x: angles.map(Math.cos), y: angles.map(Math.sin), mode: "lines", line: { color: ink, width: 1 }, hoverinfo: "skip" },
+      { x: place.multipliers.map((mu) => mu[0]), y: place.multipliers.map((mu) => mu[1]), mode: "markers",
+        customdata: place.multipliers.map((mu) => Math.hypot(...mu)), marker: { size: 9, color: out.map((is) => (is ? "#D55E00" : "#009E73")) },
+        hovertemplate: "%{x:.6g} %{y:+.6g}i<br>modulus %{customdata:.6g}<extra></extra>" }],
+    { xaxis: { title: { text: "Re μ" }, range: [-far, far] }, yaxis: { title: { text: "Im μ" }, range: [-far, far], scaleanchor: "x" } }, true);
+}
+
+function linksTo(near) {
+  if (!near.length) { return; }
+  panel.append(element("h3", "Near it"));
+  const row = element("div", "", { class: "links" });
+  for (const { number, curve, vertex, differs } of near) {
+    const kind = curve.tracked ? `${curve.tracked} curve` : "curve";
+    const words = differs.length ? `${curve.name} (${differs.join(", ")})` : curve.name;
+    row.append(button(words, () => { choose(number, vertex); document.getElementById(`curve-${number}`)?.scrollIntoView(); }, `Go to the ${kind} ${words}`));
+  }
+  panel.append(row);
+}

@@ -1,0 +1,22 @@
+function redraw() {
+  figures.filter((figure) => figure.done).forEach(drawFigure);
+  if (chosen) { choose(chosen.curve, chosen.vertex); }
+}
+
+async function start() {
+  startLook(redraw);
+  const known = document.getElementById("curves");
+  if (known) { curves.push(...JSON.parse(known.textContent)); }
+  try {
+    if (!await unpackPlotly()) { return; }
+    startFigures();
+    startTables();
+    document.addEventListener("keydown", (event) => { if (event.key === "Escape" && !panel.hidden) { close(); } });
+    document.documentElement.dataset.ready = String(Math.round(performance.now()));
+  } catch (error) {
+    console.error(error);
+    document.querySelectorAll(".figure").forEach((figure) => figure.classList.remove("drawn"));
+    document.body.classList.remove("live");
+  }
+}
+start();
