@@ -39,7 +39,7 @@ SYMBOLS: dict[str | tuple[int, int, int], str] = {
     "p": "pentagon", "h": "hexagon", "H": "hexagon2", "8": "octagon",
     (4, 1, 0): "star-diamond", (3, 1, 0): "star-triangle-up", (3, 1, 180): "star-triangle-down",
     (4, 1, 45): "star-square", (6, 1, 0): "hexagram", (8, 1, 0): "asterisk",
-    (5, 1, 180): "star", (5, 0, 180): "pentagon", (7, 1, 0): "hash",
+    "+": "cross-thin", (5, 1, 180): "star", (5, 0, 180): "pentagon", (7, 1, 0): "hash",
 }  # fmt: skip
 #: what symbols there are in space; circles for all others
 _SOLID: dict[Any, str] = {(4, 1, 0): "diamond", "s": "square", "D": "diamond", "d": "diamond", "P": "cross"}
@@ -184,10 +184,11 @@ def _markers(item: Markers | Beads, at: np.ndarray) -> dict[str, Any]:
     if len(at) == 3:
         look = {"symbol": _SOLID.get(mark.marker, "circle"), "size": _MARK_IN_SPACE * mark.size}
     else:
-        look = {"symbol": SYMBOLS[mark.marker], "size": _MARK * mark.size}
+        look = {"symbol": SYMBOLS.get(mark.marker, "circle-cross"), "size": _MARK * mark.size}
     edge = {"color": mark.edge, "width": _RIM * mark.rim}
+    face = "rgba(0,0,0,0)" if mark.face == "none" else mark.face
     texts = item.hover() if item.hover and item.name else []
-    return {**_scatter(at, "markers", item.name, texts), "marker": {**look, "color": mark.face, "line": edge}}
+    return {**_scatter(at, "markers", item.name, texts), "marker": {**look, "color": face, "line": edge}}
 
 
 def _scatter(at: np.ndarray, mode: str, name: str, texts: Sequence[str]) -> dict[str, Any]:

@@ -217,7 +217,9 @@ def _texts(values: np.ndarray, digits: int = 9) -> list[str]:
 def _cell(value: Any) -> str:
     if isinstance(value, complex | np.complexfloating):
         return _number(complex(value))
-    return f"{float(value):.9g}" if isinstance(value, float | np.floating) else str(value)
+    if isinstance(value, float | np.floating):
+        return "–" if math.isnan(value) else f"{float(value):.9g}"
+    return str(value)
 
 
 def _number(value: complex) -> str:

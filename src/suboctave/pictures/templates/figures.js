@@ -45,6 +45,7 @@ function drawFigure(figure) {
   Plotly.react(plot, tracesOf(figure), layout, config);
   if (!figure.done) {
     figure.done = true;
+    performance.mark("figure drawn");
     plot.on("plotly_click", (event) => clicked(event.points[0]));
   }
 }
@@ -116,7 +117,8 @@ function startFigures() {
   document.querySelectorAll(".figure").forEach((element) => {
     const script = element.querySelector("script");
     if (!script) { return; }
-    const figure = { element, plot: element.querySelector(".plot"), drawing: JSON.parse(script.textContent), done: false };
+    const figure = { element, plot: element.querySelector(".plot"), done: false,
+      get drawing() { return this.read ??= JSON.parse(script.textContent); } };
     element.classList.add("drawn");
     element.appendChild(actionsOf(figure));
     figure.plot.tabIndex = 0;

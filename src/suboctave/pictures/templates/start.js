@@ -12,7 +12,7 @@ async function start() {
     startFigures();
     startTables();
     document.addEventListener("keydown", (event) => { if (event.key === "Escape" && !panel.hidden) { close(); } });
-    document.documentElement.dataset.ready = String(Math.round(performance.now()));
+    document.documentElement.dataset.ready = "";
   } catch (error) {
     console.error(error);
     document.querySelectorAll(".figure").forEach((figure) => figure.classList.remove("drawn"));
