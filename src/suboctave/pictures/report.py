@@ -174,7 +174,7 @@ def page_of(results: Mapping[str, Any], title: str, failures: Mapping[str, str] 
         sections.append(section)
     versions = sorted({str(data.attrs["suboctave"]) for data in found.every if "suboctave" in data.attrs})
     systems = dict.fromkeys(str(data.attrs["system"]) for data in found.every if data.attrs.get("system"))
-    text: str = _template().render(
+    text: str = template("page.html").render(
         title=title,
         version=__version__,
         origin=" · ".join([f"suboctave {', '.join(versions) or __version__}", *systems]),
@@ -191,8 +191,15 @@ def page_of(results: Mapping[str, Any], title: str, failures: Mapping[str, str] 
     return text
 
 
+def picture_of(curves: Sequence[xarray.Dataset]) -> str:
+    """Response curves as a still picture (SVG, base64)."""
+    drawing = response_drawing([list(curves)])
+    return base64.b64encode(image_of(figure_of(drawing, style.sheet_of(_SIZE)), "svg")).decode("ascii")
+
+
 @functools.cache
-def _template() -> Any:
+def template(name: str) -> Any:
+    """A template of a page, which escapes what it is given."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     loader = PackageLoader("suboctave.pictures", "templates")
@@ -200,7 +207,7 @@ def _template() -> Any:
     readers = (is_boundary, summary_of, bifurcations, notes_on, origin_of, records_of, number_of)
     page.globals |= {reader.__name__: reader for reader in readers}
     page.policies["json.dumps_kwargs"] = {"ensure_ascii": False, "separators": (",", ":")}
-    return page.get_template("page.html")
+    return page.get_template(name)
 
 
 @functools.cache

@@ -108,17 +108,64 @@ def run(
         bool, typer.Option(help="Go on with a run that stopped; of a complete one, write what is missing.")
     ] = False,
     seconds: Annotated[float | None, typer.Option(help="Time limit for all analyses together.")] = None,
+    watch: Annotated[
+        bool, typer.Option("--watch", help="Serve a page of what is found, to this machine alone; Ctrl-C ends it.")
+    ] = False,
     allow_code: _AllowCode = False,
     json_wanted: _AsJson = False,
 ) -> None:
     """Run a study: analyses in order, then results, tables and figures."""
-    from suboctave.progress import bar
+    if watch and json_wanted:
+        raise InputError("--watch is for a reader, --json for a program: leave one of them out")
     from suboctave.study.file import read_study
+
+    read = read_study(study, allow_code)
+    if not watch:
+        _run(study, read, None, out, overwrite, resume, seconds, json_wanted)
+        return
+    from suboctave.study.screen import console
+    from suboctave.study.served import served, show_in_browser
+    from suboctave.study.watching import Watching
+
+    watching = Watching(read, out if out is not None else read.folder)
+    with served(watching.page) as address:
+        console().print(f"what is found: {address}", soft_wrap=True)
+        show_in_browser(address)
+        try:
+            _run(study, read, watching, out, overwrite, resume, seconds, json_wanted)
+        except typer.Exit as status:
+            if status.exit_code == INTERRUPTED:
+                raise
+            _wait(address)
+            raise
+        _wait(address)
+
+
+def _wait(address: str) -> None:
+    """The page of a run that is over stays until its reader has seen enough."""
+    from suboctave.study.screen import console
+    from suboctave.study.served import wait_for_ctrl_c
+
+    console().print(f"the report stays at {address}: Ctrl-C ends it", soft_wrap=True)
+    wait_for_ctrl_c()
+
+
+def _run(
+    study: Path,
+    read: Any,
+    watching: Any,
+    out: Path | None,
+    overwrite: bool,
+    resume: bool,
+    seconds: float | None,
+    json_wanted: bool,
+) -> None:
+    """Run a study that was read, with what it finds on the terminal, and on a page for who is `watching`."""
+    from suboctave.progress import bar
     from suboctave.study.runner import Finished, run_study
     from suboctave.study.screen import console
     from suboctave.study.shown import as_plain, print_result
 
-    read = read_study(study, allow_code)
     screen = console(quiet=json_wanted)
     kept: list[Any] = []  # of the whole run: analyses take it again
 
@@ -134,10 +181,14 @@ def run(
 
     def watch(step: Any) -> Any:
         head()
+        if watching is not None:
+            watching.begin(step.name)
         return bar(step.name)
 
     def report(item: Finished) -> None:
         head()
+        if watching is not None:
+            watching.note(item)
         if item.result is not None:
             note = ", taken from the earlier run" if item.reused else f" in {item.seconds:.2f} s"
             print_result(screen, item.step.name, item.result, note)
@@ -146,6 +197,8 @@ def run(
             screen.print(f": failed. {item.failure}")
 
     outcome = run_study(read, out, overwrite, resume, watch, report, seconds)
+    if watching is not None:
+        watching.finish(outcome)
     if outcome.complete is not None:
         screen.print(f"nothing to compute: {outcome.complete} is complete", soft_wrap=True)
     elif outcome.files:
@@ -182,6 +235,9 @@ def run(
 def show(
     path: Annotated[Path, typer.Argument(help="A results file (.nc), a study file (.toml), or a journal.")],
     csv: Annotated[Path | None, typer.Option(help="Write the tables as .csv files into this folder.")] = None,
+    page: Annotated[
+        bool, typer.Option("--page", help="Serve the report page of a results file, to this machine alone.")
+    ] = False,
     overwrite: Annotated[bool, typer.Option(help="Replace .csv files that are there.")] = False,
     allow_code: _AllowCode = False,
     json_wanted: _AsJson = False,
@@ -194,12 +250,39 @@ def show(
     is_study, is_journal = path.suffix.lower() == ".toml", path.suffix == Path(JOURNAL).suffix
     if csv is not None and (is_study or is_journal):
         raise InputError("--csv writes the tables of a results file; this is none")
+    if page and (is_study or is_journal):
+        raise InputError("--page shows a results file; this is none: `suboctave run --watch` shows a study that runs")
+    if page and json_wanted:
+        raise InputError("--page is for a reader, --json for a program: leave one of them out")
+    if page:
+        _show_page(path, allow_code)
+        return
     if is_study:
         _show_study(path, allow_code, json_wanted)
     elif is_journal:
         _show_journal(path, json_wanted)
     else:
         _show_results(path, csv, overwrite, allow_code, json_wanted)
+
+
+def _show_page(path: Path, allow_code: bool) -> None:
+    """Serve the page of a results file until Ctrl-C."""
+    from suboctave.pictures.report import page_of
+    from suboctave.study.outputs import shown_on_page
+    from suboctave.study.results import Results, load
+    from suboctave.study.screen import console
+    from suboctave.study.served import served, show_in_browser, wait_for_ctrl_c
+
+    results = load(path, allow_code=allow_code)
+    shown = shown_on_page(results) if isinstance(results, Results) else {path.stem: results}
+    if not shown:
+        raise InputError(f"{path} holds nothing that a page could show")
+    title = str(results.attributes.get("title") or path.stem) if isinstance(results, Results) else path.stem
+    text = page_of(shown, title)
+    with served(lambda: text) as address:
+        console().print(f"{address} shows {path} to this machine alone; Ctrl-C ends it", soft_wrap=True)
+        show_in_browser(address)
+        wait_for_ctrl_c()
 
 
 def _show_results(path: Path, csv: Path | None, overwrite: bool, allow_code: bool, json_wanted: bool) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path, PurePath
 from typing import Any
@@ -14,7 +14,6 @@ from suboctave.atomic import free_place
 from suboctave.errors import InputError, Key
 from suboctave.maps.isolas.result import Isolas
 from suboctave.pictures.paper import SUFFIXES
-from suboctave.results.diagram import BifurcationDiagram
 from suboctave.store.table import Table
 from suboctave.study.figures import StudyCurves, drawable
 from suboctave.study.mistakes import Section
@@ -89,9 +88,16 @@ def places(outputs: Outputs, steps: Iterable[Step], folder: Path) -> list[Path]:
 
 
 def write_outputs(
-    outputs: Outputs, results: Results, folder: Path, title: str, left: Sequence[Path] = ()
+    outputs: Outputs,
+    results: Results,
+    folder: Path,
+    title: str,
+    left: Sequence[Path] = (),
+    failures: Mapping[str, str] | None = None,
 ) -> Iterator[Path]:
     """Write what was asked for of what there is, and yield each file; what stood there is replaced, or `left`.
+
+    `failures`: the analyses that gave nothing, and why: the page says so.
 
     Raises InputError, after everything else is written, for figures of motions or branches that finished analyses lack.
     """
@@ -116,19 +122,16 @@ def write_outputs(
     if outputs.html is not None and path not in left and any(drawable(item) for item in results.values()):
         from suboctave.pictures.report import write_report
 
-        # of isolas that none was found is said
-        worth = {name: item for name, item in results.items() if isinstance(item, Isolas) or len(item)}
-        shown: dict[str, Any] = {
-            name: item
-            if isinstance(item, BifurcationDiagram | Isolas)
-            else item.to_xarray().assign_attrs(seconds=results.details.get(name, {}).get("seconds", float("nan")))
-            for name, item in worth.items()
-        }
-        write_report(shown, path, title=title or "Study", overwrite=True)
+        write_report(shown_on_page(results), path, title=title or "Study", overwrite=True, failures=failures)
         yield path
     if missing:
         rest = "everything else is written; change the figure, and go on with --resume"
         raise InputError("; ".join([*missing, rest]))
+
+
+def shown_on_page(results: Results) -> dict[str, Any]:
+    """The results that a page shows: all that are not empty; of isolas that none was found is said."""
+    return {name: item for name, item in results.items() if isinstance(item, Isolas) or len(item)}
 
 
 def tables_of(name: str, item: Result, folder: Path) -> Iterator[tuple[Path, Callable[..., Path]]]:

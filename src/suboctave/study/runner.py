@@ -60,7 +60,8 @@ class Finished:
 class Outcome:
     """What a run gave: analyses in order, files written, and what stopped it or one of them before the end.
 
-    `complete`: the results file of a study that was complete already; `left`: outputs that stood there and were left.
+    `complete`: the results file of a study that was complete already; `left`: outputs that stood there and were left;
+    `results`: of all analyses, by name.
     """
 
     finished: list[Finished] = field(default_factory=list)
@@ -68,6 +69,7 @@ class Outcome:
     interruption: Interruption | None = None
     complete: Path | None = None
     left: list[Path] = field(default_factory=list)
+    results: dict[str, Result] = field(default_factory=dict)
 
     @property
     def interrupted(self) -> bool:
@@ -78,6 +80,11 @@ class Outcome:
     def failed(self) -> list[Finished]:
         """The analyses that failed."""
         return [item for item in self.finished if item.failure]
+
+    @property
+    def failures(self) -> dict[str, str]:
+        """The analyses that failed, and why."""
+        return {item.step.name: item.failure for item in self.failed}
 
 
 Watch = Callable[[Step], AbstractContextManager[Any]]
@@ -153,7 +160,8 @@ def run_study(
                         break
         if results:
             journal.extend([("output", {"file": path.name}, None) for path in targets])
-            outcome.files = _written(study, results, details, place)
+            outcome.results = results
+            outcome.files = _written(study, results, details, place, failures=outcome.failures)
         if not (outcome.interrupted or outcome.failed):  # else --resume goes on from here
             journal.remove()
     return outcome
@@ -183,11 +191,17 @@ def _prepare(place: Path, targets: list[Path], journal: Path, overwrite: bool, r
 
 
 def _written(
-    study: Study, results: dict[str, Result], details: dict[str, Any], place: Path, left: Sequence[Path] = ()
+    study: Study,
+    results: dict[str, Result],
+    details: dict[str, Any],
+    place: Path,
+    left: Sequence[Path] = (),
+    failures: dict[str, str] | None = None,
 ) -> list[Path]:
     """The files that are written of results; those in `left` are not."""
     attributes = {"title": study.title, "study": study.text, "analyses": "\n".join(results)}
-    return list(write_outputs(study.outputs, Results(results, attributes, details), place, study.title, left))
+    whole = Results(results, attributes, details)
+    return list(write_outputs(study.outputs, whole, place, study.title, left, failures))
 
 
 def _complete(study: Study, place: Path, targets: list[Path], overwrite: bool) -> Outcome:
@@ -202,14 +216,15 @@ def _complete(study: Study, place: Path, targets: list[Path], overwrite: bool) -
             "changed; --overwrite replaces it, --out writes elsewhere"
         )
     details = {name: results.details[name] for name in names}
+    items = {name: results[name] for name in names}
     finished = [
         Finished(step, results[step.name], float(details[step.name].get("seconds", 0.0)), True) for step in study.steps
     ]
     left = [] if overwrite else [target for target in targets if target.exists()]
     if len(left) < len(targets):
         make_folder(place)
-    files = _written(study, {name: results[name] for name in names}, details, place, left)
-    return Outcome(finished, files, complete=path, left=left)
+    files = _written(study, items, details, place, left)
+    return Outcome(finished, files, complete=path, left=left, results=items)
 
 
 def _one(

@@ -1,0 +1,159 @@
+"""The page of a run while it runs: what its journal holds so far, drawn anew at every request, then its report."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from suboctave.errors import SuboctaveError
+from suboctave.pictures.report import page_of, picture_of, template
+from suboctave.store.journal import read_journal
+from suboctave.store.layout import EventRow, curve_dataset
+from suboctave.study.outputs import shown_on_page
+from suboctave.study.results import Results
+from suboctave.study.runner import JOURNAL, Finished, Outcome, recovered
+from suboctave.study.screen import significant
+
+if TYPE_CHECKING:
+    import xarray
+
+    from suboctave.study.file import Study
+
+#: seconds after which the page asks again
+REFRESH = 2
+#: samples of a motion of which its amplitude is taken while the run is under way
+_SAMPLES = 256
+#: points from which a curve is drawn, and curves in the picture of one analysis
+_DRAWN, _CURVES = 2, 12
+
+
+class Watching:
+    """What a page shows of a run: `begin` and `note` are told of its analyses, `finish` gives the page of its end.
+
+    `page()` may be called from another thread.
+    """
+
+    def __init__(self, study: Study, folder: Path) -> None:
+        self.study, self.folder = study, folder
+        self.since = perf_counter()
+        self.ended: str | None = None
+        self.under_way = ""
+        self.over: dict[str, Finished] = {}
+        self._lock = threading.Lock()
+        #: pictures by analysis, with the sizes of the curves that they show
+        self._stills: dict[str, tuple[list[int], str]] = {}
+
+    def begin(self, name: str) -> None:
+        """An analysis is begun."""
+        self.under_way = name
+
+    def note(self, item: Finished) -> None:
+        """An analysis is over."""
+        self.over[item.step.name] = item
+        self.under_way = ""
+
+    def finish(self, outcome: Outcome) -> None:
+        """The run is over: from now on its report is shown, or what failed."""
+        title, results = self.study.title or self.study.source.name, Results(outcome.results)
+        shown, failures = shown_on_page(results), outcome.failures
+        if shown:
+            self.ended = page_of(shown, title, failures)
+
+    def page(self) -> str:
+        """The page as it is now."""
+        if self.ended is not None:
+            return self.ended
+        with self._lock:  # one request after the other: Matplotlib draws in one thread at a time
+            return self._so_far()
+
+    def _so_far(self) -> str:
+        path = self.folder / JOURNAL
+        try:
+            known = {item.name: item for item in recovered(path)}
+            curves = curves_so_far(path, self.study.system.observed_dof)
+        except (SuboctaveError, OSError):  # not there yet, or no more
+            known, curves = {}, {}
+        rows = []
+        for step in self.study.steps:
+            item, over = known.get(step.name), self.over.get(step.name)
+            state = "waiting"
+            if over is not None:
+                state = f"failed: {over.failure}" if over.failure else f"finished in {over.seconds:.2f} s"
+            elif step.name == self.under_way:
+                state = "running"
+            numbers = ("", "") if item is None else (str(item.points), str(item.bifurcations))
+            rows.append((step.name, step.kind, state, *numbers))
+        events = [
+            (name, kind, significant(omega, 9), significant(amplitude, 7))
+            for name, item in known.items()
+            for kind, omega, amplitude in item.events
+        ]
+        pictures = [(name, self._still(name, own)) for name, own in curves.items()]
+        text: str = template("watch.html").render(
+            title=self.study.title or self.study.source.name,
+            seconds=f"{perf_counter() - self.since:.0f}",
+            refresh=REFRESH,
+            rows=rows,
+            events=events,
+            pictures=pictures,
+        )
+        return text
+
+    def _still(self, name: str, curves: list[xarray.Dataset]) -> str:
+        """The picture of an analysis, drawn anew when it has more points."""
+        sizes = [data.sizes["point"] for data in curves]
+        if self._stills.get(name, ([], ""))[0] != sizes:
+            self._stills[name] = sizes, picture_of(curves)
+        return self._stills[name][1]
+
+
+def curves_so_far(path: Path, dof: int) -> dict[str, list[xarray.Dataset]]:
+    """The response curves that a journal holds, by analysis; of those under way amplitudes are of samples."""
+    curves: dict[str, list[xarray.Dataset]] = {}
+    begun: dict[str, list[dict[str, Any]]] = {}
+    for record in read_journal(path):
+        name = str(record.fields.get("name", ""))
+        if record.kind == "points":
+            if not record.fields["from"]:
+                begun[name] = []
+            begun[name].append(dict(record.fields))
+        elif record.kind in ("branch", "analysis"):
+            dataset = record.dataset
+            begun.pop(name, None)
+            if dataset.attrs.get("contents") == "branch" and not dataset.attrs.get("tracked"):
+                curves.setdefault(name, []).append(dataset)
+    for name, parts in begun.items():
+        curve = _of_points(parts, dof)
+        if curve is not None:
+            curves.setdefault(name, []).append(curve)
+    return {name: own[-_CURVES:] for name, own in curves.items() if own}
+
+
+def _of_points(parts: list[dict[str, Any]], dof: int) -> xarray.Dataset | None:
+    """The points that were written down of a curve that is being followed."""
+    omega = np.array([value for part in parts for value in part["omega"]])
+    values = [one for part in parts for one in part["values"]]
+    if len(omega) < _DRAWN:
+        return None
+    parameters = {name: np.array([one[name] for one in values]) for name in values[0]}
+    varied = [name for name, column in parameters.items() if np.ptp(column) > 0.0]
+    free = "omega" if np.ptp(omega) > 0.0 or not varied else varied[0]
+    motions = [np.array(c)[:, dof] for part in parts for c in part["coefficients"]]
+    amplitude = [float(np.max(np.abs(_sampled(c)))) for c in motions]
+    stable = [one for part in parts for one in part["stable"]]
+    events = [
+        EventRow(str(kind), len(omega) - 2, float(at), float(size), parameters=dict(there))
+        for part in parts
+        for kind, at, there, size in part["bifurcations"]
+    ]
+    return curve_dataset(omega, amplitude, stable=stable, parameters=parameters, free=free, events=events)
+
+
+def _sampled(c: np.ndarray) -> np.ndarray:
+    """A motion a_0, a_1, b_1, ... at equal intervals over its period."""
+    phase = np.outer(2.0 * np.pi * np.arange(_SAMPLES) / _SAMPLES, np.arange(1, len(c) // 2 + 1))
+    return np.asarray(c[0] + np.cos(phase) @ c[1::2] + np.sin(phase) @ c[2::2])
