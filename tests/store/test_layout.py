@@ -48,7 +48,7 @@ def branch(stable, bifurcations, events=()):
         grazings=(),
         events=events,
         closed=False,
-        ended="p reached 1",
+        endings=(), ended="p reached 1",
         observe=1,
         options={"harmonics": "adaptive", "newton": object()},
         warnings=("one", "two"),

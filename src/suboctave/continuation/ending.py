@@ -30,6 +30,18 @@ class EndReason(StrEnum):
     OTHER = "other"
 
 
+#: those after which there may be more of the curve
+_EARLY = {
+    EndReason.NOT_STARTED,
+    EndReason.LEFT_RANGE,
+    EndReason.STEP_TOO_SMALL,
+    EndReason.MAX_POINTS,
+    EndReason.ASTRAY,
+    EndReason.NO_MEANING,
+    EndReason.INTERRUPTED,
+    EndReason.TIME_LIMIT,
+}
+
 #: the sentences, from the place, the details and the seconds; where there is none here the details are the sentence
 _SENTENCES = {
     EndReason.START: "",
@@ -67,6 +79,11 @@ class Ending:
         """Where an interruption found a curve."""
         reason = EndReason.INTERRUPTED if interruption.seconds is None else EndReason.TIME_LIMIT
         return cls(reason, where, seconds=interruption.seconds)
+
+    @property
+    def early(self) -> bool:
+        """Whether the curve would go on: it was stopped, or could not be followed further."""
+        return self.reason in _EARLY
 
     @property
     def interruption(self) -> Interruption | None:

@@ -298,5 +298,6 @@ def html_of(text: str) -> str:
             formula = formula.replace(spelling, letter)
         for command, accent in (("ddot", "\u0308"), ("dot", "\u0307")):
             formula = re.sub(rf"\\{command}{{(\w)((?:_{{\w+}}|_\w)?)}}", rf"\1{accent}\2", formula)
+            formula = re.sub(rf"\\{command} (\w)", rf"\1{accent}", formula)
         pieces[i] = re.sub(r"_{(\w+)}|_(\w)", r"<sub>\1\2</sub>", formula)
     return "".join(pieces).replace(r"\$", "$")

@@ -426,10 +426,10 @@ def _file_name(names: Sequence[str] | Mapping[str, Any]) -> str:
 
 
 # -------------------------------------------------------------------------------------------------------------- summary
-def _counts(found: Found, anchors: Mapping[str, str]) -> list[tuple[int, str, str]]:
-    """What was found: how many, of what, and where the first of it stands."""
+def _counts(found: Found, anchors: Mapping[str, str]) -> list[tuple[int | str, str, str]]:
+    """What was found: how many, of what, and where the first of it stands; maps and the like by name."""
     curves = [data for data in found.every if _has_points(data) and not is_isolas(data)]
-    counts: list[tuple[int, str, str]] = []
+    counts: list[tuple[int | str, str, str]] = []
     if curves:
         points = sum(data.sizes["point"] for data in curves)
         first = f"curve-{number_of(curves[0])}"
@@ -446,7 +446,7 @@ def _counts(found: Found, anchors: Mapping[str, str]) -> list[tuple[int, str, st
             number = int(head.sizes["isola"])
             counts.append((number, "isola" if number == 1 else "isolas", anchors[name]))
     for name in found.pictures:
-        counts.append((1, name, anchors[name]))
+        counts.append(("", name, anchors[name]))
     return counts
 
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 _TEXT = "text"
 #: attributes of a dataset that have a place of their own on the page, or none
 _PLACED = {"layout", "suboctave", "system", "free", "ended", "closed", "period", "observed_dof", "dofs", "warnings"}
-_PLACED |= {"record", "digest", "contents", "tracked", "plane", "isola", "at", "seconds", "number"}
+_PLACED |= {"record", "digest", "contents", "tracked", "plane", "isola", "at", "seconds", "number", "early"}
 #: characters of an attribute from which it is folded away, and of a row of a table that stands beside its figure
 _LONG, _BESIDE = 400, 56
 
@@ -98,6 +98,8 @@ def _remarks(dataset: xarray.Dataset) -> list[str]:
 def notes_on(dataset: xarray.Dataset) -> list[str]:
     """What the reader must know: warnings, and what stayed unsettled."""
     notes = [note for note in str(dataset.attrs.get("warnings", "")).splitlines() if note.strip()]
+    if dataset.attrs.get("early"):
+        notes.append(f"Ended before its end: {dataset.attrs.get('ended', '')}.")
     if "multiplier_errors" in dataset and dataset.sizes.get("multiplier"):
         near = np.abs(np.abs(dataset["multipliers"].to_numpy()) - 1.0) <= dataset["multiplier_errors"].to_numpy()
         which = "a multiplier"
@@ -217,6 +219,8 @@ def _texts(values: np.ndarray, digits: int = 9) -> list[str]:
 def _cell(value: Any) -> str:
     if isinstance(value, complex | np.complexfloating):
         return _number(complex(value))
+    if isinstance(value, bool | np.bool_):
+        return "yes" if value else "no"
     if isinstance(value, float | np.floating):
         return "–" if math.isnan(value) else f"{float(value):.9g}"
     return str(value)

@@ -184,6 +184,8 @@ def branch_dataset(branch: Any) -> xarray.Dataset:
     )
     if branch.shows != "response":
         dataset = dataset.assign_attrs(shows=branch.shows)
+    if any(ending.early for ending in branch.endings):
+        dataset = dataset.assign_attrs(early=1)
     kind = getattr(branch, "kind", None)
     if kind is None or branch.plane is None:
         return dataset

@@ -32,7 +32,11 @@ function chosenTrace(figure, choice) {
     marker: { size: 17, color: "rgba(0,0,0,0)", line: { color: ring, width: 3 } } };
 }
 
-function tracesOf(figure) { return [...figure.drawing.data.map(traceOn), chosenTrace(figure, chosen)]; }
+// Colours of cells stay, and so do those of what is drawn upon them.
+function tracesOf(figure) {
+  const { data } = figure.drawing, cells = data.some((trace) => trace.type === "heatmap");
+  return [...(cells ? data : data.map(traceOn)), chosenTrace(figure, chosen)];
+}
 
 function drawFigure(figure) {
   const { drawing, plot } = figure;
