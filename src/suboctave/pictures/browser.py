@@ -50,7 +50,7 @@ _MARK, _MARK_IN_SPACE, _RIM = 1.5, 0.7, 1.5
 #: millimetres of a frame on a screen, by which marks along lines are spaced
 _SCREEN = (160.0, 110.0)
 #: sides of a point for its text, the preferred one first; shares of the axes within which points are near
-_SIDES, _NEAR = ("middle right", "top center", "bottom center", "middle left"), 0.08
+_SIDES, _NEAR = ("middle right", "top left", "bottom left", "bottom right"), 0.08
 _FONT = {"family": "system-ui, Segoe UI, DejaVu Sans, Arial, sans-serif", "size": 13, "color": style.INK}
 _AXIS = {"showline": True, "linecolor": style.INK, "gridcolor": style.GRID, "zeroline": False}
 _LEGEND = {"orientation": "h", "yref": "container", "y": 0, "yanchor": "bottom", "x": 0, "font": {"size": 12}}
@@ -215,7 +215,7 @@ def _labels(labels: Sequence[Label], axes: Sequence[Axis]) -> dict[str, Any]:
         "name": "",
         "cliponaxis": False,
         **_coordinates(np.array([at for at, _, _ in taken]).T),
-        "text": [f"\u2002{html_of(text)}\u2002" for _, text, _ in taken],
+        "text": [f"\u2003{html_of(text)}\u2003" for _, text, _ in taken],
         "textposition": [side for _, _, side in taken],
         "hoverinfo": "skip",
         "showlegend": False,

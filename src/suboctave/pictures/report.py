@@ -250,7 +250,7 @@ def _datasets(name: str, item: Any) -> dict[str, xarray.Dataset]:
     given: Any = item
     if hasattr(item, "to_table"):
         given = item.to_table().to_xarray()
-    elif hasattr(item, "bifurcations_frame"):  # curves: with their motions
+    elif any(hasattr(item, name) for name in ("bifurcations_frame", "limit_points")):  # curves: with their motions
         given = item.to_xarray(motions=True)
         seconds = getattr(item, "seconds", None)
         if seconds is not None and isinstance(given, xarray.Dataset):

@@ -2,8 +2,8 @@
 const curves = [];
 
 function numbers(text, Kind) {
-  const raw = atob(text);
-  const bytes = Uint8Array.from(raw, (letter) => letter.charCodeAt(0));
+  const raw = atob(text), bytes = new Uint8Array(raw.length);
+  for (let i = 0; i < raw.length; i++) { bytes[i] = raw.charCodeAt(i); }
   return new Kind(bytes.buffer);
 }
 

@@ -38,8 +38,16 @@ function tracesOf(figure) {
   return [...(cells ? data : data.map(traceOn)), chosenTrace(figure, chosen)];
 }
 
+// A legend of many entries stands below the frame and must not eat it up.
+function makeRoom(figure) {
+  const entries = figure.drawing.data.filter((trace) => trace.showlegend !== false && trace.name).length;
+  const rows = Math.ceil(entries / Math.max(1, Math.floor(figure.plot.clientWidth / 220)));
+  figure.plot.style.height = rows > 3 ? `calc(var(--plot) + ${1.25 * (rows - 3)}rem)` : "";
+}
+
 function drawFigure(figure) {
   const { drawing, plot } = figure;
+  makeRoom(figure);
   const config = { responsive: true, displaylogo: false, plotlyServerURL: "",
     modeBarButtons: drawing.space
       ? [["orbitRotation", "tableRotation", "zoom3d", "pan3d"], ["resetCameraDefault3d"]]

@@ -130,7 +130,8 @@ function picture(heading, words, data, layout, round) {
 
 function motionPictures(curve, place, c) {
   const { omega } = place, { nu } = curve, sampled = samples(c, nu, omega), { tau, x, v, count } = sampled;
-  const ink = dark() ? "#6cc1f5" : "#0072B2", soft = dark() ? "#a9adb3" : "#8c8c8c", line = { color: ink, width: 2 };
+  const ink = dark() ? "#6cc1f5" : "#0072B2", soft = dark() ? "#a9adb3" : "#8c8c8c";
+  const line = { color: ink, width: 2, simplify: false };
   const touching = contacts(curve, place), own = touching.filter((one) => one.own);
   const largest = peak(c, sampled), sub = curve.dof === null ? "x" : `x<sub>${curve.dof}</sub>`;
   const across = tau.map((one) => (one * nu) / (2 * Math.PI));
