@@ -11,7 +11,11 @@ import pytest
 import xarray
 
 import suboctave as so
+from suboctave.pictures.drawing import Axis, Drawing, Entry, Frame, Raster
+from suboctave.pictures.paper import figure_of
 from suboctave.pictures.report import write_report
+from suboctave.pictures.style import sheet_of
+from suboctave.store.table import Table
 from suboctave.verification.verify import verify
 
 pytestmark = pytest.mark.skipif(chromium.found() is None, reason="there is no Chromium on this machine")
@@ -160,6 +164,42 @@ def test_tables_sort_and_filter(tmp_path, duffing):
         page.click_on("#curve-0 tbody button")
         page.wait("!panel.hidden")
         assert "made from a dataset without them" in page.script("panel.innerText")
+        assert page.errors == []
+
+
+def test_a_place_in_a_map_says_what_is_there(study, tmp_path):
+    class Map:
+        """What a page needs of a map."""
+
+        def to_table(self):
+            return Table({"j": np.array([0.0, 0.1])}, "a map")
+
+        def plot(self):
+            cells = np.ones((2, 2, 3))
+            cells[1] = 0.0
+            frame = Frame([Raster(cells, np.array([2.0, 2.3, 2.6]), np.array([0.0, 0.1, 0.2]), layer=0.0)])
+            frame.entries |= {"one motion": Entry(patch="#ffffff"), "two motions": Entry(patch="#000000")}
+            return figure_of(Drawing([Axis("omega", 2.0, 2.6), Axis("j", 0.0, 0.2)], [frame]), sheet_of((5.0, 4.0)))
+
+    path = write_report({"near": study["near"], "map": Map()}, tmp_path / "map.html")
+    with closing(chromium.Page(tmp_path / "profile")) as page:
+        page.open(path.as_uri())
+        page.script("document.querySelector('#part-1 .plot').scrollIntoView({ block: 'center', behavior: 'instant' })")
+        page.wait("document.querySelector('#part-1 .plot')._fullLayout")
+        page.script("new Promise((go) => setTimeout(go, 300))")
+        page.click(
+            *page.script("""(() => {
+            const plot = document.querySelector("#part-1 .plot"), box = plot.getBoundingClientRect();
+            const { xaxis, yaxis } = plot._fullLayout;
+            return [box.x + xaxis._offset + xaxis.l2p(2.15), box.y + yaxis._offset + yaxis.l2p(0.15)];
+        })()""")
+        )
+        page.wait("!panel.hidden")
+        words = page.script("panel.innerText")
+        assert page.script("panel.querySelector('h2').textContent") == "two motions"
+        assert "near (j = 0)" in words
+        page.click_on("#panel .links button")
+        page.wait("panel.querySelector('h2').textContent.startsWith('Point ')")
         assert page.errors == []
 
 

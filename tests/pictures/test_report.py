@@ -4,15 +4,21 @@ from __future__ import annotations
 
 import base64
 import gzip
+import html
 import html.parser
 import json
+import re
 
 import numpy as np
 import pytest
 import xarray
 
 from suboctave.errors import InputError
+from suboctave.pictures.browser import figure_data
+from suboctave.pictures.drawing import Axis, Drawing, Entry, Frame, Polyline, Raster
+from suboctave.pictures.points import verified_by
 from suboctave.pictures.report import write_report
+from suboctave.pictures.style import Pen
 from suboctave.store.layout import curve_dataset
 
 EVIL = "</script><script>alert('x')</script> & <b>\"bold\"</b>"
@@ -169,3 +175,76 @@ def test_wrong_input_is_refused(duffing, tmp_path):
     with pytest.raises(InputError, match="not laid out by suboctave"):
         write_report({"curve": duffing().drop_attrs()}, tmp_path / "a.html")
     assert not list(tmp_path.iterdir())
+
+
+def test_what_was_found_and_what_needs_attention_stands_on_top(page, duffing, tmp_path):
+    data = duffing().assign_attrs(early=1, ended="the step became too small", warnings=EVIL)
+    path = write_report({"curve": data}, tmp_path / "sum.html", failures={"other": f"no {EVIL}"})
+    text = path.read_text(encoding="utf-8")
+    summary = text[text.index('id="summary"') : text.index('id="part-0"')]
+    words = re.sub(r"\s+", " ", html.unescape(re.sub(r"<[^>]+>", " ", summary)))
+    for expected in ("1 curve", f"{data.sizes['point']} points", "2 limit points", "other: failed. no"):
+        assert expected in words, expected
+    assert "curve: Ended before its end: the step became too small." in words
+    assert "no point was held against time integration" in words
+    assert EVIL not in summary
+    assert '<a href="#curve-0">' in summary
+    assert 'id="curve-0"' in text
+
+
+def test_points_are_packed_with_all_their_digits(page, duffing):
+    data = duffing()
+    figure, known, *_ = page({"curve": data}).scripts
+    (curve,) = json.loads(known[1])
+    assert curve["free"] == ["omega"]
+    assert set(curve["fixed"]) == {"c", "alpha", "F"}
+    for places, prefix in ((curve["points"], ""), (curve["events"], "event_")):
+        omega = np.frombuffer(base64.b64decode(places["values"]["omega"]), "<f8")
+        np.testing.assert_array_equal(omega, data[f"{prefix}omega"].values)
+    assert curve["events"]["kind"] == ["LP", "LP"]
+    # each vertex of a figure says which point or event it is
+    by_name = {trace["name"]: trace for trace in json.loads(figure[1])["data"]}
+    assert by_name["limit point"]["customdata"] == [-1, -2]
+    for name in ("stable", "unstable"):
+        trace = by_name[name]
+        assert trace["meta"]["curve"] == 0
+        for x, vertex in zip(trace["x"], trace["customdata"], strict=True):
+            if x is not None:
+                known = data["omega"].values[vertex] if vertex >= 0 else data["event_omega"].values[-1 - vertex]
+                assert x == pytest.approx(known, rel=1e-8)
+
+
+def test_verifications_are_told_at_their_points(duffing):
+    data = duffing()
+    omega, amplitude = data["omega"].values[[3, 9]], data["amplitude"].values[[3, 9]]
+    met = {name: ("event", data[name].values) for name in ("event_omega", "event_amplitude")}
+    check = xarray.Dataset(
+        {
+            "index": ("point", [3, 9]),
+            "omega": ("point", omega),
+            "amplitude": ("point", amplitude),
+            "distance": ("point", [1e-5, 0.2]),
+            "outcome": ("point", np.array(["agrees", "disagrees"], dtype=object)),
+            "event_agrees": ("event", [True, False]),
+            "event_distance": ("event", [1e-6, 0.3]),
+            **met,
+        }
+    )
+    verified = verified_by([check], data)
+    assert verified.points == {3: "agrees; distance 1.0e-05", 9: "disagrees; distance 2.0e-01"}
+    assert verified.events == {0: "confirmed; distance 1.0e-06", 1: "NOT CONFIRMED; distance 3.0e-01"}
+    assert verified.wrong == 2
+    assert verified_by([check], duffing(force=0.3)) is None
+
+
+def test_a_raster_is_cells_by_number_with_their_names():
+    cells = np.zeros((2, 3, 3))
+    cells[0, 0] = 1.0
+    frame = Frame([Raster(cells, np.arange(4.0), np.arange(3.0), layer=0.0)])
+    frame.entries["white"] = Entry(patch="#ffffff")
+    frame.add(Polyline(np.array([[0.0, 3.0], [0.0, 2.0]]), Pen("#1a1a1a")), "border")
+    drawn = figure_data(Drawing([Axis("omega", 0.0, 3.0), Axis("j", 0.0, 2.0)], [frame]), "map")
+    raster = next(trace for trace in drawn["data"] if trace["type"] == "heatmap")
+    assert [raster["meta"]["cells"][number] for number in raster["z"][0]] == ["white", "", ""]
+    assert (raster["x"], raster["y"]) == ([0.5, 1.5, 2.5], [0.5, 1.5])
+    assert {trace["name"] for trace in drawn["data"]} >= {"white", "border"}

@@ -60,7 +60,7 @@ _SCENE = {
     "aspectratio": {"x": 1.5, "y": 1.15, "z": 0.95},
     "camera": {"eye": {"x": 1.05, "y": -1.75, "z": 0.9}, "center": {"x": 0, "y": 0, "z": -0.2}},
 }
-_MATH = ((r"\omega", spelt("omega")), (r"\max\,", "max "), (r"\,", " "))
+_MATH = ((r"\omega", spelt("omega")), (r"\lambda", "λ"), (r"\delta", "δ"), (r"\max\,", "max "), (r"\,", " "))
 
 
 def figure_data(drawing: Drawing, name: str) -> dict[str, Any]:
@@ -195,7 +195,8 @@ def _scatter(at: np.ndarray, mode: str, name: str, texts: Sequence[str]) -> dict
     """A trace through places, (axes, places), with the texts under the mouse."""
     hover: dict[str, Any] = {"hoverinfo": "skip"}
     if name or mode == "lines":
-        template = html_of(name) + ("<br>%{text}" if texts or mode == "lines" else "") + "<extra></extra>"
+        said = "<br>%{text}" if any(texts) else "<br>%{x:.6g}, %{y:.6g}"
+        template = html_of(name) + said + "<extra></extra>"
         broken = [html.escape(text).replace("\n", "<br>") for text in texts]
         hover = {"text": broken, "hovertemplate": template}
     return {"type": "scatter3d" if len(at) == 3 else "scatter", "mode": mode, **_coordinates(at), **hover}

@@ -7,7 +7,7 @@ it down for Plotly. Texts are those of Matplotlib, with formulas between dollar 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -193,7 +193,8 @@ class Frame:
 
     def add(self, item: Item, legend: str = "") -> None:
         """Add an item, with a name in the legend where it has one there: shown as the item is drawn."""
-        self.items.append(item)
+        named = replace(item, name=legend, group=legend) if legend and not item.name else item
+        self.items.append(named)
         if not legend:
             return
         match item:

@@ -452,6 +452,8 @@ def _counts(found: Found, anchors: Mapping[str, str]) -> list[tuple[int | str, s
 
 def _several(name: str) -> str:
     """A name of a kind, several of it."""
+    if name[0].isupper():  # called after people
+        return f"{name} points" if not name.endswith("point") else f"{name}s"
     if name.endswith(("s", "um")):
         return {"extremum": "extrema"}.get(name, name)
     return f"{name[:-1]}ies" if name.endswith("y") else f"{name}s"

@@ -34,6 +34,7 @@ function layoutOn(layout) {
   const { ink, paper, grid } = looks[dark() ? "dark" : "light"];
   const own = { ...layout, font: { ...layout.font, color: ink }, paper_bgcolor: paper, plot_bgcolor: paper,
     hoverlabel: { ...layout.hoverlabel, bgcolor: paper, bordercolor: ink, font: { color: ink } } };
+  if (dark() && own.shapes) { own.shapes = own.shapes.map((shape) => ({ ...shape, opacity: shape.type === "rect" ? 0.3 : 1 })); }
   const axis = (one) => ({ ...one, linecolor: ink, gridcolor: grid, tickcolor: ink });
   for (const name of ["xaxis", "yaxis"]) { if (own[name]) { own[name] = axis(own[name]); } }
   if (own.scene) {

@@ -153,12 +153,14 @@ function motionPictures(curve, place, c) {
   const top = Math.max(...sizes), floor = Math.floor(Math.log10(top)) - 8;
   const bars = sizes.map((size) => Math.max(0, Math.log10(size) - floor));
   const whole = sizes.map((_, k) => k % nu === 0), far = Math.min(sizes.length - 1, 24 * nu);
-  picture("Spectrum", "Amplitudes of the harmonics, logarithmic",
-    [{ type: "bar", base: floor, x: sizes.map((_, k) => k / nu), y: bars, width: 0.5 / nu, marker: { color: whole.map((is) => (is ? ink : "#E69F00")) },
-      customdata: sizes, hovertemplate: "%{x:.4g} ω: %{customdata:.4g}<extra></extra>" }],
-    { xaxis: { title: { text: "frequency / ω" }, range: [-0.6, far / nu + 0.6] },
-      yaxis: { title: { text: "amplitude" }, range: [floor, floor + 9], tickvals: [0, 2, 4, 6, 8].map((i) => floor + i),
-        ticktext: [0, 2, 4, 6, 8].map((i) => `1e${floor + i}`) } });
+  if (top > 0) { // at rest there is none
+    picture("Spectrum", "Amplitudes of the harmonics, logarithmic",
+      [{ type: "bar", base: floor, x: sizes.map((_, k) => k / nu), y: bars, width: 0.5 / nu, marker: { color: whole.map((is) => (is ? ink : "#E69F00")) },
+        customdata: sizes, hovertemplate: "%{x:.4g} ω: %{customdata:.4g}<extra></extra>" }],
+      { xaxis: { title: { text: "frequency / ω" }, range: [-0.6, far / nu + 0.6] },
+        yaxis: { title: { text: "amplitude" }, range: [floor, floor + 9], tickvals: [0, 2, 4, 6, 8].map((i) => floor + i),
+          ticktext: [0, 2, 4, 6, 8].map((i) => `1e${floor + i}`) } });
+  }
   panel.append(element("h3", "Contact"));
   if (!touching.length) { panel.append(element("p", "no element has a gap", { class: "soft" })); }
   for (const one of touching) {
