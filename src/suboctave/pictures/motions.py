@@ -114,7 +114,8 @@ def plot_history(motions: Any, path: str | Path | None = None, **options: Unpack
     text = "time (s)" if view.frequency else r"time in load periods, $t/T$" if in_periods else r"time $\omega_0 t$"
     across = Axis(text, -0.02 * longest, 1.02 * longest, ticks=ticks)
     if view.quantity == "force":
-        upwards = f"force of element {view.element}" + (f" ({view.unit})" if view.unit else "")
+        named = view.unit_of("force", datasets)
+        upwards = f"force of element {view.element}" + (f" ({named})" if named else "")
     else:
         upwards = view.name(datasets[0], DERIVATIVES[view.quantity])
     return drawn.figure(across, Axis(upwards))
@@ -145,6 +146,8 @@ class MotionDrawing:
         check_path(path)
         elements = () if view.element is None else (view.element,)
         datasets = motion_datasets(motions, given.get("points"), given.get("dof"), elements)
+        for dataset in datasets:
+            view.check_time(dataset)
         overlay, labels, size = bool(given.get("overlay")), given.get("labels"), given.get("size")
         count = len(datasets)
         check_count("labels", labels, count, "motions")
