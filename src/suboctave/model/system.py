@@ -371,6 +371,11 @@ class System:
             lines.append(f"  units      {self.units}; mass in {self.units.mass}, frequencies in {self.units.frequency}")
         return "\n".join(lines)
 
+    def _repr_html_(self) -> str:
+        from suboctave.model.display import system_html
+
+        return system_html(self)
+
 
 def _assemble(check: bool = False, **parts: Any) -> System:
     """A system from all of its parts."""

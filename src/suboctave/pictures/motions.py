@@ -26,7 +26,7 @@ from suboctave.options import with_options
 from suboctave.pictures import style
 from suboctave.pictures.drawing import Axis, Drawing, Entry, Frame, Guide, Markers, Polyline, Ticks, plain
 from suboctave.pictures.options import DERIVATIVES, HistoryOptions, MotionOptions, MotionView, SpectrumOptions
-from suboctave.pictures.paper import check_path, figure_of
+from suboctave.pictures.paper import check_path, save_or_show
 from suboctave.pictures.strokes import check_count, differing
 from suboctave.pictures.style import Mark, Pen, curve_styles, period_colour, period_name, period_of, styles_of_periods
 
@@ -214,7 +214,7 @@ class MotionDrawing:
         legend = "free" if len(self.frames) == 1 else "outside"
         arranged: dict[str, Any] = {"columns": self.columns, "legend": legend, "grid": False, "small": True}
         self.frames[0].entries = self.legend | self.last
-        return figure_of(Drawing(axes, self.frames, plain(self.title), **arranged), self.sheet, self.path)
+        return save_or_show(Drawing(axes, self.frames, plain(self.title), **arranged), self.sheet, self.path)
 
 
 def _captions(datasets: Sequence[xarray.Dataset], view: MotionView) -> list[list[str]]:
