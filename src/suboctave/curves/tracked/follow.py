@@ -202,6 +202,8 @@ class _Tracker(Driver):
             return Ending(EndReason.MOTIONS_END, detail=end.reason)
         new = self._smooth(a, new)
         self._take(self.watch.passed(a, new, self.trace.warnings))
+        if self.watch.over_corner(a, new):
+            self._turn_at_corner(a, new.point)
         self._add(new)
         self.previous = new
         self._report(point)
