@@ -113,7 +113,8 @@ class _Tracker(Driver):
         if last is None or self.corners >= _CORNERS:
             return None
         self.corners += 1
-        corner = beyond_corner(last, self.settings.newton)
+        before = (p.orbit for p in reversed(self.trace.points))
+        corner = beyond_corner(last, before, self.settings.newton)
         if corner is None:
             return None
         point, note = corner
