@@ -1,12 +1,15 @@
-"""What `progress=` means: nothing, a bar on the terminal, or a callable."""
+"""What `progress=` means: nothing, a bar on the terminal or in a notebook, or a callable."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from html import escape
+from time import monotonic
 from typing import Any
 
 from suboctave.errors import InputError
+from suboctave.session import in_notebook
 
 Report = Callable[[float, str], None]
 
@@ -46,14 +49,14 @@ class CurveProgress:
 def reporting(progress: Any, title: str) -> Iterator[Report | None]:
     """A function (share done, where) to report to, or None.
 
-    `progress` is None or False (silent), True (a bar on standard error, silent where that is not a terminal), or a
-    callable that takes the share done, 0 to 1, and a text. If that has a method `followed`, it is called after each
-    point with the trace so far (points, bifurcations): a journal keeps it.
+    `progress` is None or False (silent), True (a bar in a notebook, or on standard error, silent where that is not a
+    terminal), or a callable that takes the share done, 0 to 1, and a text. If that has a method `followed`, it is
+    called after each point with the trace so far (points, bifurcations): a journal keeps it.
     """
     if progress is None or progress is False:
         yield None
     elif progress is True:
-        with bar(title) as report:
+        with notebook_bar(title) if in_notebook() else bar(title) as report:
             yield report
     elif callable(progress):
         yield progress
@@ -92,3 +95,30 @@ def bar(title: str) -> Iterator[Report]:
             shown.update(task, completed=furthest, where=where)
 
         yield report
+
+
+#: seconds between changes of a bar in a notebook
+_OFTEN = 0.1
+
+
+@contextmanager
+def notebook_bar(title: str) -> Iterator[Report]:
+    """A bar in the output of a notebook's cell with the text behind it, gone afterwards."""
+    from IPython.display import HTML, display
+
+    begin = last = monotonic()
+    shown = display(HTML(""), display_id=True)
+    furthest = 0.0
+
+    def report(share: float, where: str = "") -> None:
+        nonlocal furthest, last
+        furthest, now = max(furthest, share), monotonic()
+        if now - last >= _OFTEN:
+            last = now
+            words = f"{title} {100.0 * furthest:.0f} %, {now - begin:.0f} s: {where}"
+            shown.update(HTML(f"<progress value='{furthest:.3f}'></progress> <small>{escape(words)}</small>"))
+
+    try:
+        yield report
+    finally:
+        shown.update(HTML(""))

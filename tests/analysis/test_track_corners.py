@@ -68,3 +68,18 @@ def test_a_corner_passed_monotonically_is_no_extremum(stepping):
     assert np.all(np.diff(curve.parameter("g")) * np.sign(curve.parameter("g")[-1] - curve.parameter("g")[0]) > 0.0)
     assert not curve.extrema
     np.testing.assert_allclose(np.sort(curve.parameter("g")[[0, -1]]), (-0.4, 0.9))
+
+
+@pytest.mark.parametrize("max_step", [None, 0.02, 0.005])
+def test_limit_points_that_turn_back_in_a_corner_and_again_in_a_cusp(max_step):
+    """The left stop grazes at p = 0.37660353; the curve comes back from there, and turns in a cusp 1e-6 farther."""
+    system = so.library.reference_oscillator(p=0.4, j=0.0)
+    (fold,) = so.frequency_response(system, (0.6, 0.8)).bifurcations["LP"][:1]
+    folds = so.track(fold, "p", (0.36, 0.41), max_step=max_step)
+    turned = [(event.kind, event.extreme, event.parameter_name) for event in folds.bifurcations]
+    assert sorted(turned) == [("CP", "", "p"), ("extremum", "maximum", "omega"), ("extremum", "maximum", "p")]
+    for event in folds.bifurcations:
+        at = 0.37660262 if event.kind == "CP" else 0.37660353
+        assert event.parameter("p") == pytest.approx(at, abs=2e-8 + event.uncertainty)
+        assert event.amplitude == pytest.approx(1.0, abs=1e-5)
+        assert event.uncertainty < 1e-6

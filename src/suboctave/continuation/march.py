@@ -123,6 +123,10 @@ class Place:
         return None
 
 
+#: squared sine of the angle between tangents below which there is no corner
+_STRAIGHT = 0.01
+
+
 @dataclass(frozen=True)
 class Arrival:
     """A curve meets another one and ends there: its last point before that (None: the one it has), and the ending."""
@@ -271,9 +275,11 @@ class March:
                 else:
                     fine = turn < options.sharpest and solved.distance < 0.4 * step
                     fine = fine and taken <= 1.000001 * options.max_step
+                    # nor across a corner that lies nearer
+                    fine = fine and _leaving(point, new) is new
                     fine = fine and (self.inspect is None or self.inspect(point, new))
                 if fine:
-                    return new, solved.distance, turn
+                    return (_leaving(point, new) if step <= options.min_step else new), solved.distance, turn
                 failure = ConvergenceError("the curve turns too sharply")
             except ConvergenceError as error:
                 failure = error
@@ -340,6 +346,7 @@ class March:
             except ConvergenceError:
                 nearer = None
                 continue
+            new = _leaving(point, new)
             if share <= _AT_ONCE and taken <= _CLOSE * share:
                 return new, 0.0, _angle(point, new)
             # what lies farther comes from the corner if a tenth of the share leads less than half as far
@@ -359,6 +366,16 @@ class March:
         # the predictor's curvature may carry a step a little beyond its length: keep the distance below the largest
         # allowed
         return min(0.98 * options.max_step, max(step, options.min_step))
+
+
+def _leaving(point: CurvePoint, new: CurvePoint) -> CurvePoint:
+    """A point behind a corner, headed away from where its tangent meets that of the last point before the corner."""
+    a, b, way = (new.weights * vector for vector in (point.tangent, new.tangent, new.u - point.u))
+    a, b = a / length(a), b / length(b)
+    cosine_between = float(a @ b)
+    sine_squared = 1.0 - cosine_between**2
+    beyond = float(way @ b) - cosine_between * float(way @ a)
+    return new if sine_squared < _STRAIGHT or beyond >= 0.0 else new.turned
 
 
 def _angle(a: CurvePoint, b: CurvePoint) -> float:

@@ -520,6 +520,8 @@ class TimeResult(Stored, ABC):
         for name, value in self._derived().items():
             (arrays if isinstance(value, tuple) else own)[name] = value
         produced = {"dofs": n, "system": self.system.name, "suboctave": __version__}
+        if self.system.units:
+            produced["units"] = str(self.system.units)
         if self.projection is not None:
             produced["projection"] = self.basis
         if projected and self.projection is not None:

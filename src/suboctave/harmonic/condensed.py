@@ -164,7 +164,7 @@ class Condensed:
 
     def __repr__(self) -> str:
         how = "as they are" if self.projected.shapes is None else "projected"
-        return "\n  ".join([in_words(self, self.system.n, how), *self.words])
+        return "\n  ".join([in_words(self, self.system.n, how, self.system.units), *self.words])
 
     @property
     def words(self) -> tuple[str, ...]:

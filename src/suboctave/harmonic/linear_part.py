@@ -27,6 +27,7 @@ from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.lazy import lazy
 from suboctave.model.matrices import MatrixCoefficient, viscous_damping
 from suboctave.model.system import System
+from suboctave.units import UnitSystem
 
 
 @runtime_checkable
@@ -103,7 +104,7 @@ class StructuralMatrices:
         self.matrices = np.array([matrix.value(self.values) for matrix in system.linear_parts])
 
     def __repr__(self) -> str:
-        return in_words(self, self.size, "as they are")
+        return in_words(self, self.size, "as they are", self.system.units)
 
     @property
     def words(self) -> tuple[str, ...]:
@@ -204,10 +205,13 @@ def damping_words(system: System) -> tuple[str, ...]:
     )
 
 
-def in_words(linear: LinearPart, dofs: int, how: str) -> str:
+def in_words(linear: LinearPart, dofs: int, how: str, declared: UnitSystem | None) -> str:
     """How many degrees of freedom are taken how, what is unknown, and the first natural frequencies."""
     lowest = natural_frequencies(linear)[:6]
-    units = (("rad per unit time", 1.0), ("Hz, if that is a second", 2.0 * np.pi))
+    circular, cycles = "rad per unit time", "Hz, if that is a second"
+    if declared:
+        circular, cycles = declared.frequency, declared.cycles
+    units = ((circular, 1.0), (cycles, 2.0 * np.pi))
     shown = [f"{', '.join(f'{w / unit:.6g}' for w in lowest)} {name}" for name, unit in units]
     return (
         f"Linear part: {dofs} degrees of freedom, {how}; {linear.size} unknown displacements\n"

@@ -148,7 +148,7 @@ def project(
         object.__setattr__(result, name, value)
     result._fill(
         check=False, **parts, elements=[_seen_element(e, structure.n, seen) for e in structure.elements], loads=loads,
-        parameters=structure.parameters, name=structure.name, dof_names=(),
+        parameters=structure.parameters, name=structure.name, dof_names=(), units=structure.units,
     )  # fmt: skip
     return result
 

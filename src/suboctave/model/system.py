@@ -23,9 +23,10 @@ from suboctave.model.expressions.coefficients import Coefficient
 from suboctave.model.expressions.reader import RESERVED
 from suboctave.model.loads import HarmonicLoad, Load, LoadComponent
 from suboctave.model.matrices import MatrixCoefficient, check_damping, check_mass, matrix_coefficient, viscous_damping
+from suboctave.units import UnitSystem
 
 _MATRICES = ("mass", "damping", "stiffness", "structural")
-_PARTS = (*_MATRICES, "elements", "loads", "parameters", "name", "dof_names")
+_PARTS = (*_MATRICES, "elements", "loads", "parameters", "name", "dof_names", "units")
 
 
 class System:
@@ -38,7 +39,8 @@ class System:
     other loads, on the right-hand side. `parameters`: `{name: number}`, every one of them used somewhere.
     `structural`: structural damping S, a force `i S x` at every frequency: like the other matrices, `{"eta": K}` for a
     loss factor. `dof_names`: names for messages. Units are the user's own, if they are consistent; frequencies are
-    circular.
+    circular. `units`: their names, length, force (or mass) and time, such as `"mm, N, s"`, for axes and tables; nothing
+    is converted.
 
     Raises `InputError` for anything that does not fit, before any work.
     """
@@ -52,6 +54,7 @@ class System:
     parameters: Mapping[str, float]
     name: str
     dof_names: tuple[str, ...]
+    units: UnitSystem | None
     n: int
     _components: tuple[LoadComponent, ...]
 
@@ -66,6 +69,7 @@ class System:
         name: str = "",
         dof_names: Iterable[str] = (),
         structural: Any = None,
+        units: str | None = None,
     ) -> None:
         read = matrix_coefficient(mass, None, "mass")
         self._fill(
@@ -81,12 +85,17 @@ class System:
             parameters=_read_parameters(parameters),
             name=str(name),
             dof_names=_read_dof_names(dof_names, read.n),
+            units=UnitSystem.of(units),
         )
         self._check_values(self.parameters)
 
     @classmethod
     def from_equations(
-        cls, equations: str | Sequence[str], parameters: Mapping[str, float] | None = None, name: str = ""
+        cls,
+        equations: str | Sequence[str],
+        parameters: Mapping[str, float] | None = None,
+        name: str = "",
+        units: str | None = None,
     ) -> System:
         """A system from equations of motion as text, such as `"x'' + 2*zeta*x' + x + a*x**3 = p*cos(omega*t)"`.
 
@@ -101,7 +110,7 @@ class System:
         from suboctave.model.equations import parts_of
 
         read = _read_parameters(parameters)
-        return cls(**parts_of(equations, read), parameters=read, name=name)
+        return cls(**parts_of(equations, read), parameters=read, name=name, units=units)
 
     def _fill(self, check: bool, **parts: Any) -> None:
         """Take all parts; `check`: whether they fit each other, where no system has accepted them already."""
@@ -136,6 +145,10 @@ class System:
     def moved_to(self, values: Mapping[str, float]) -> System:
         """As `with_parameters`, at values where a motion was solved: nothing is checked, or said, any more."""
         return self._changed(parameters={**self.parameters, **values})
+
+    def with_units(self, units: str | None) -> System:
+        """The same system with names of its units, such as `"mm, N, s"`; its numbers stay as they are."""
+        return self._changed(units=UnitSystem.of(units))
 
     def with_scaled_loads(self, name: str = "load_scale") -> System:
         """The same system whose oscillating loads are multiplied by a new parameter, 1 to begin with.
@@ -354,7 +367,14 @@ class System:
         if self.parameters:
             values = ", ".join(f"{name} = {value:g}" for name, value in self.parameters.items())
             lines.append(f"  parameters {values}")
+        if self.units:
+            lines.append(f"  units      {self.units}; mass in {self.units.mass}, frequencies in {self.units.frequency}")
         return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        from suboctave.model.display import system_html
+
+        return system_html(self)
 
 
 def _assemble(check: bool = False, **parts: Any) -> System:
@@ -425,6 +445,7 @@ def describe(system: System, arrays: Arrays | None = None) -> dict[str, Any]:
         "elements": [describe_part(element, arrays) for element in system.elements],
         "loads": [describe_part(load, arrays) for load in system.loads],
         "parameters": dict(system.parameters),
+        **({"units": str(system.units)} if system.units else {}),
     }
 
 
@@ -446,6 +467,7 @@ def build(
             parts[f"{family}s"] = [build_part(item, family, arrays or {}, allow_code) for item in items]
         parts |= {"parameters": _read_parameters(description["parameters"]), "name": str(description["name"])}
         parts["dof_names"] = _read_dof_names(description["dof_names"], parts["mass"].n)
+        parts["units"] = UnitSystem.of(description.get("units"))
     except InputError:
         raise
     except (KeyError, TypeError, AttributeError, ValueError) as error:

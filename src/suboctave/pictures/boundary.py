@@ -28,7 +28,7 @@ from suboctave.options import with_options
 from suboctave.pictures import strokes, style
 from suboctave.pictures.drawing import Axis, Beads, Drawing, Entry, Frame, Label, Markers, Region, Surface, plain
 from suboctave.pictures.options import Coordinates, SpaceOptions, View
-from suboctave.pictures.paper import figure_of
+from suboctave.pictures.paper import save_or_show
 from suboctave.pictures.strokes import add_strokes, checked, events_of, line_through, named_axis, seen_as
 from suboctave.pictures.style import Mark, Pen, period_colour, period_name, period_of, places_among, tinted
 from suboctave.store.layout import coordinate
@@ -86,7 +86,7 @@ def plot_boundaries(
     several: list[Any] = list(curves) if isinstance(curves, list | tuple) else [curves]
     drawing = boundary_drawing(several, x=x, y=y, labels=labels, view=view, projected=projected)
     drawing.frames[0].title = plain(title or "")
-    return figure_of(drawing, style.sheet_of(size), path)
+    return save_or_show(drawing, style.sheet_of(size), path)
 
 
 def boundary_drawing(
@@ -350,7 +350,7 @@ def plot_space(
     if sheet.named:  # named sizes are widths: in space more height is needed
         width = sheet.inches[0]
         sheet = style.Sheet((width, 0.8 * width if width < 5.0 else 0.62 * width), sheet.look, named=True)
-    return figure_of(drawing, sheet, path)
+    return save_or_show(drawing, sheet, path)
 
 
 def space_drawing(

@@ -17,7 +17,7 @@ from suboctave.errors import InputError, chosen_dof, suggest
 from suboctave.pictures import style
 from suboctave.pictures.boundary import datasets_of
 from suboctave.pictures.drawing import STROKES, Axis, Band, Entry, Frame, Guide, Markers, Polyline, Raster, dot, plain
-from suboctave.pictures.options import Coordinates, View, as_multiple, check_quantity, shown_multiple
+from suboctave.pictures.options import Coordinates, View, as_multiple, check_quantity, declared_units, shown_multiple
 from suboctave.pictures.paper import Layout, picture
 from suboctave.pictures.response import response_frame
 from suboctave.pictures.strokes import check_count
@@ -106,9 +106,10 @@ def plot_brute_force(
     suffix = "" if curves is None else ", in time"
     for start in shown:
         _add_motions(frame, diagram.isel(start=known.index(start)), start, dof, quantity == "section", suffix)
-    symbol = symbol_of(diagram, dof, 0).strip("$")
+    symbol = _symbol_of(diagram, dof, 0).strip("$")
     upwards = rf"$\max\,|{symbol}|$" if quantity == "amplitude" else rf"${symbol}(t_k)$, stroboscopic"
-    across = Axis(r"$\omega$" if varied == "omega" else plain(varied), low, high)
+    upwards = _with_unit(upwards, diagram, 0)
+    across = Axis(_frequency_axis(diagram) if varied == "omega" else plain(varied), low, high)
     return frame, (across, Axis(upwards))
 
 
@@ -227,8 +228,23 @@ def _name(period: int) -> str:
 
 def symbol_of(dataset: xarray.Dataset, dof: int, order: int) -> str:
     """A displacement, or its first derivative, as an axis says it."""
+    return _with_unit(_symbol_of(dataset, dof, order), dataset, order)
+
+
+def _symbol_of(dataset: xarray.Dataset, dof: int, order: int) -> str:
     symbol = f"x_{{{dof}}}" if dataset.attrs["dofs"] > 1 else "x"
     return rf"$\dot {symbol}$" if order else f"${symbol}$"
+
+
+def _with_unit(text: str, dataset: xarray.Dataset, order: int) -> str:
+    """Behind what an axis says of a displacement or its derivative the unit that the system declares."""
+    declared = declared_units([dataset])
+    return f"{text} ({declared.name(('length', 'length / time')[order])})" if declared else text
+
+
+def _frequency_axis(dataset: xarray.Dataset) -> str:
+    declared = declared_units([dataset])
+    return rf"$\omega$ ({declared.frequency})" if declared else r"$\omega$"
 
 
 def checked_dof(dataset: xarray.Dataset, dof: int | None) -> int:
@@ -310,7 +326,7 @@ def plot_lyapunov_map(chart: xarray.Dataset, *, lines: Sequence[tuple[str, np.nd
     known = list(dict.fromkeys(name for name, _, _ in lines))
     for name, x, y in lines:
         frame.add(Polyline(np.array([x, y]), Pen(_LINES[known.index(name) % len(_LINES)])), name)
-    axes = Axis(r"$\omega$", *across[[0, -1]]), Axis(plain(chart.attrs["varied"]), *upwards[[0, -1]])
+    axes = Axis(_frequency_axis(chart), *across[[0, -1]]), Axis(plain(chart.attrs["varied"]), *upwards[[0, -1]])
     return frame, axes
 
 
@@ -345,7 +361,7 @@ def plot_basins(basins: xarray.Dataset, *, points: Sequence[np.ndarray] | None =
         frame.add(Markers(places[inside].T, Mark("o", 4.5, "#ffffff"), cut=True, layer=4.0))
     one = int(basins.attrs["dofs"]) == 1
     axes = [
-        Axis(_symbol(basins.attrs[f"plane_{letter}"], one), *edges[[0, -1]])
+        Axis(_symbol(basins, f"plane_{letter}", one), *edges[[0, -1]])
         for letter, edges in zip("xy", (x, y), strict=True)
     ]
     # there is no free place inside
@@ -361,10 +377,10 @@ def _colours(periods: np.ndarray) -> list[str]:
     ]
 
 
-def _symbol(name: str, one: bool) -> str:
-    kind, _, dof = name.partition("_")
+def _symbol(basins: xarray.Dataset, plane: str, one: bool) -> str:
+    kind, _, dof = str(basins.attrs[plane]).partition("_")
     letter = "x" if kind == "x" else r"\dot x"
-    return f"${letter}(0)$" if one else f"${letter}_{{{dof}}}(0)$"
+    return _with_unit(f"${letter}(0)$" if one else f"${letter}_{{{dof}}}(0)$", basins, int(kind != "x"))
 
 
 def _edges(grid: np.ndarray) -> np.ndarray:

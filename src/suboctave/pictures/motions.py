@@ -26,7 +26,7 @@ from suboctave.options import with_options
 from suboctave.pictures import style
 from suboctave.pictures.drawing import Axis, Drawing, Entry, Frame, Guide, Markers, Polyline, Ticks, plain
 from suboctave.pictures.options import DERIVATIVES, HistoryOptions, MotionOptions, MotionView, SpectrumOptions
-from suboctave.pictures.paper import check_path, figure_of
+from suboctave.pictures.paper import check_path, save_or_show
 from suboctave.pictures.strokes import check_count, differing
 from suboctave.pictures.style import Mark, Pen, curve_styles, period_colour, period_name, period_of, styles_of_periods
 
@@ -114,7 +114,8 @@ def plot_history(motions: Any, path: str | Path | None = None, **options: Unpack
     text = "time (s)" if view.frequency else r"time in load periods, $t/T$" if in_periods else r"time $\omega_0 t$"
     across = Axis(text, -0.02 * longest, 1.02 * longest, ticks=ticks)
     if view.quantity == "force":
-        upwards = f"force of element {view.element}" + (f" ({view.unit})" if view.unit else "")
+        named = view.unit_of("force", datasets)
+        upwards = f"force of element {view.element}" + (f" ({named})" if named else "")
     else:
         upwards = view.name(datasets[0], DERIVATIVES[view.quantity])
     return drawn.figure(across, Axis(upwards))
@@ -145,6 +146,8 @@ class MotionDrawing:
         check_path(path)
         elements = () if view.element is None else (view.element,)
         datasets = motion_datasets(motions, given.get("points"), given.get("dof"), elements)
+        for dataset in datasets:
+            view.check_time(dataset)
         overlay, labels, size = bool(given.get("overlay")), given.get("labels"), given.get("size")
         count = len(datasets)
         check_count("labels", labels, count, "motions")
@@ -211,7 +214,7 @@ class MotionDrawing:
         legend = "free" if len(self.frames) == 1 else "outside"
         arranged: dict[str, Any] = {"columns": self.columns, "legend": legend, "grid": False, "small": True}
         self.frames[0].entries = self.legend | self.last
-        return figure_of(Drawing(axes, self.frames, plain(self.title), **arranged), self.sheet, self.path)
+        return save_or_show(Drawing(axes, self.frames, plain(self.title), **arranged), self.sheet, self.path)
 
 
 def _captions(datasets: Sequence[xarray.Dataset], view: MotionView) -> list[list[str]]:

@@ -16,6 +16,7 @@ import numpy as np
 from suboctave.errors import InputError, suggest
 from suboctave.pictures.style import period_of
 from suboctave.store.layout import QUANTITIES, check_component, coordinate, has_component, reading_name
+from suboctave.units import UnitSystem
 
 if TYPE_CHECKING:
     import xarray
@@ -137,14 +138,30 @@ class Units:
         """What a frequency is multiplied by on an axis of frequencies."""
         return 1.0 / (2.0 * math.pi) if self.frequency == "Hz" else 1.0 / (self.omega_reference or 1.0)
 
-    @property
-    def of_omega(self) -> str:
+    def of_omega(self, datasets: Sequence[xarray.Dataset]) -> str:
         """What an axis of forcing frequencies says."""
         if self.frequency == "Hz":
             return "forcing frequency (Hz)"
         if self.omega_reference is not None:
             return r"frequency ratio $\omega/\omega_0$"
-        return r"forcing frequency $\omega$" + (" (rad/s)" if self.frequency else "")
+        declared = declared_units(datasets)
+        unit = self.frequency or (declared.frequency if declared else "")
+        return r"forcing frequency $\omega$" + (f" ({unit})" if unit else "")
+
+    def unit_of(self, dimension: str, datasets: Sequence[xarray.Dataset]) -> str:
+        """The unit of a quantity: the one given, else, where nothing is scaled, that which the systems declare."""
+        if self.unit is not None or self.scale is not None or self.omega_reference is not None:
+            return self.unit or ""
+        declared = declared_units(datasets)
+        return declared.name(dimension) if declared else ""
+
+    def check_time(self, dataset: xarray.Dataset) -> None:
+        """InputError for frequencies in a unit that the declared one of time contradicts."""
+        declared = declared_units([dataset])
+        if self.frequency is not None and declared is not None and declared.time != "s":
+            raise InputError(
+                f"frequency={self.frequency!r} is for time in s, and the system declares {declared.time}: leave it out"
+            )
 
 
 @dataclass(frozen=True)
@@ -263,6 +280,7 @@ class Coordinates:
 
     def check(self, dataset: xarray.Dataset) -> None:
         """InputError where the dataset does not have what is drawn."""
+        self.view.check_time(dataset)
         name = self.view.variable
         if None in self.names and (name not in dataset or f"event_{name}" not in dataset):
             raise InputError(
@@ -319,13 +337,13 @@ class Coordinates:
         """What the axes say; `xlabel` and `ylabel` of the view are those of the first two."""
         view, texts = self.view, []
         for index, name in enumerate(self.names):
-            text = view.of_omega if name == "omega" else view.label(datasets) if name is None else name
+            text = view.of_omega(datasets) if name == "omega" else view.label(datasets) if name is None else name
             if name == "omega" and datasets and all("shows" in dataset.attrs for dataset in datasets):
                 # of motions that nothing drives
                 text = text.removeprefix("forcing ")
             unit = view.unit if index == self._scaled else None
-            if name is None and view.in_degrees and view.unit is None:
-                unit = "°"
+            if name is None and unit is None:
+                unit = "°" if view.in_degrees else view.unit_of(QUANTITIES[view.quantity].unit, datasets)
             texts.append(text + (f" ({unit})" if unit else ""))
         own = (view.xlabel, view.ylabel, None)
         return tuple(given or text for given, text in zip(own, texts, strict=False))
@@ -368,10 +386,11 @@ class MotionView(Units):
             text = f"${_DOTS[order]}{index}$"
         if words:
             text = f"{list(DERIVATIVES)[order]} {text}"
-        if self.unit:
-            per = "" if not order or self.omega_reference is not None else ("/s", "/s²")[order - 1]
-            per = per if self.frequency or not per else per.replace("s", "time")
-            text += f" ({self.unit}{per})"
+        declared = declared_units([dataset])
+        if unit := self.unit_of("length", [dataset]):
+            time = "s" if self.frequency else declared.time if declared else "time"
+            per = "" if not order or self.omega_reference is not None else (f"/{time}", f"/{time}²")[order - 1]
+            text += f" ({unit}{per})"
         return text
 
     def at_frequency(self, omega: float) -> str:
@@ -381,6 +400,12 @@ class MotionView(Units):
         if self.omega_reference is not None:
             return rf"$\omega/\omega_0$ = {omega / self.omega_reference:.4g}"
         return rf"$\omega$ = {omega:.4g}" + (" rad/s" if self.frequency else "")
+
+
+def declared_units(datasets: Sequence[xarray.Dataset]) -> UnitSystem | None:
+    """The units that the systems of all datasets declare; None where they differ."""
+    texts = {str(dataset.attrs.get("units", "")) for dataset in datasets}
+    return UnitSystem.of(texts.pop()) if len(texts) == 1 else None
 
 
 def check_quantity(quantity: str, known: Collection[str]) -> None:

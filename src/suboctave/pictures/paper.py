@@ -40,6 +40,7 @@ from suboctave.pictures.drawing import (
 )
 from suboctave.pictures.options import PageOptions
 from suboctave.pictures.strokes import bent
+from suboctave.session import at_prompt
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -64,23 +65,41 @@ _ASPECT = (1.5, 1.15, 0.95)
 _SMALL = 4.2
 
 
-def figure_of(drawing: Drawing, sheet: style.Sheet, path: str | Path | None = None) -> Figure:
-    """The figure of a drawing on a page, saved where a path is given."""
+def figure_of(drawing: Drawing, sheet: style.Sheet) -> Figure:
+    """The figure of a drawing on a page, without a window."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    in_space = len(drawing.axes) == 3
-    figure = Figure(figsize=sheet.inches, layout=None if in_space else "constrained", facecolor="white")
+    figure = Figure(figsize=sheet.inches, facecolor="white")
     FigureCanvasAgg(figure)
-    if in_space:
-        _in_space(figure, drawing, sheet)
-    else:
-        _in_plane(figure, drawing, sheet)
+    return _filled(figure, drawing, sheet)
+
+
+def save_or_show(drawing: Drawing, sheet: style.Sheet, path: str | Path | None) -> Figure:
+    """The figure of a drawing, saved where a path is given; else at a prompt in a window, where there is a screen."""
+    if path is None and at_prompt():
+        from matplotlib import get_backend, pyplot
+        from matplotlib.backends import BackendFilter, backend_registry
+
+        if get_backend().lower() not in backend_registry.list_builtin(BackendFilter.NON_INTERACTIVE):
+            figure = _filled(pyplot.figure(figsize=sheet.inches, facecolor="white"), drawing, sheet)
+            figure.show()
+            return figure
+    figure = figure_of(drawing, sheet)
     if path is not None:
         save_figure(figure, path)
-    _DRAWINGS[figure] = drawing
     # Notebooks show an object that has this; without pyplot nothing else would tell them to.
     setattr(figure, "_repr_png_", partial(image_of, figure, "png", dpi=110.0))  # noqa: B010
+    return figure
+
+
+def _filled(figure: Figure, drawing: Drawing, sheet: style.Sheet) -> Figure:
+    if len(drawing.axes) == 3:
+        _in_space(figure, drawing, sheet)
+    else:
+        figure.set_layout_engine("constrained")
+        _in_plane(figure, drawing, sheet)
+    _DRAWINGS[figure] = drawing
     return figure
 
 
@@ -112,7 +131,8 @@ def picture(size: tuple[float, float], **arranged: Any) -> Callable[[Callable[..
             path, title, own = (options.pop(name, None) for name in ("path", "title", "size"))
             frame, axes = layout(*given, **options)
             frame.title = style.checked_text(title)
-            return figure_of(Drawing(axes, [frame], **arranged), style.sheet_of(size if own is None else own), path)
+            sheet = style.sheet_of(size if own is None else own)
+            return save_or_show(Drawing(axes, [frame], **arranged), sheet, path)
 
         return drawn
 

@@ -15,6 +15,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -106,7 +107,7 @@ class Found:
     """The results of a study as the page shows them: their datasets by name, pictures of what is no curve, checks."""
 
     datasets: dict[str, dict[str, xarray.Dataset]] = field(default_factory=dict)
-    pictures: dict[str, Any] = field(default_factory=dict)
+    pictures: dict[str, Figure] = field(default_factory=dict)
     checks: list[xarray.Dataset] = field(default_factory=list)
     #: what is known of each numbered curve, ready for JSON, and what shooting said of it
     curves: list[dict[str, Any]] = field(default_factory=list)
@@ -227,7 +228,7 @@ def _found(results: Mapping[str, Any]) -> Found:
         # of a table what it was taken from; maps and results in time are both
         whole: Any = getattr(item, "result", None) or (item if hasattr(item, "to_table") else None)
         if hasattr(whole, "plot"):
-            found.pictures[str(name)] = whole.plot()
+            found.pictures[str(name)] = _pictured(str(name), whole)
         if hasattr(whole, "bifurcations_frame") and hasattr(whole, "disagreements"):
             found.checks.append(whole.to_xarray())
     for name, own in found.datasets.items():
@@ -288,7 +289,7 @@ def _section(name: str, found: Found, item: Any) -> Section:
     if "row" not in dataset.sizes and name not in found.pictures:
         return Section(name, before=["a curve without points"])
     heading = str(dataset.attrs.get("title", ""))
-    figures = [_pictured(name, found.pictures[name])] if name in found.pictures else []
+    figures = [found.pictures[name]] if name in found.pictures else []
     table = columns_of(dataset) if "row" in dataset.sizes else None
     return Section(name, before=[heading] if heading else [], table=table, figures=figures)
 
@@ -414,9 +415,12 @@ def _figure(drawing: Drawing, name: str, words: str) -> Figure:
     return Figure(figure_data(drawing, name), still, words)
 
 
-def _pictured(name: str, figure: Any) -> Figure:
-    """A figure of a map, of basins, ...: for the browser as well where its drawing is known."""
-    drawing, still = drawing_of(figure), base64.b64encode(image_of(figure, "svg")).decode("ascii")
+def _pictured(name: str, item: Any) -> Figure:
+    """The picture of a map, of basins, ...: for the browser as well where its drawing is known."""
+    with TemporaryDirectory() as folder:  # saved: what is not opens a window at a prompt
+        path = Path(folder) / "picture.svg"
+        drawing = drawing_of(item.plot(path))
+        still = base64.b64encode(path.read_bytes()).decode("ascii")
     data = None if drawing is None or len(drawing.frames) > 1 else figure_data(drawing, _file_name([name]))
     return Figure(data, still, f"Picture of {name}")
 

@@ -26,7 +26,7 @@ from suboctave.pictures.boundary import (
 )
 from suboctave.pictures.drawing import Axis, Drawing, Entry, Frame, Markers, Ticks, plain, spread
 from suboctave.pictures.options import Coordinates, CurveOptions, View
-from suboctave.pictures.paper import draw, dress, figure_of, handles
+from suboctave.pictures.paper import draw, dress, handles, save_or_show
 from suboctave.pictures.strokes import (
     add_strokes,
     check_count,
@@ -94,7 +94,7 @@ def plot_panels(
     drawing = response_drawing(groups, x=x, labels=labels, view=view)
     for frame, title in zip(drawing.frames, titles or (), strict=False):
         frame.title = plain(title)
-    return figure_of(drawing, sheet, path)
+    return save_or_show(drawing, sheet, path)
 
 
 def response_drawing(

@@ -190,7 +190,8 @@ class Reading:
             meaning += f", element {self.number:g}: {system.elements[int(self.number or 0)].label}"
         elif kind.numbered:
             meaning += f", harmonic {self.number:g}"
-        return {"long_name": meaning, "units": kind.unit} | ({} if self.dof is None else {"dof": str(self.dof)})
+        unit = system.units.name(kind.unit) if system.units else kind.unit
+        return {"long_name": meaning, "units": unit} | ({} if self.dof is None else {"dof": str(self.dof)})
 
 
 def _force_ratio(orbit: PeriodicOrbit, harmonic: float | None, r: Array) -> float:

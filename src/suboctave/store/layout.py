@@ -186,6 +186,10 @@ def branch_dataset(branch: Any) -> xarray.Dataset:
         dataset = dataset.assign_attrs(shows=branch.shows)
     if any(ending.early for ending in branch.endings):
         dataset = dataset.assign_attrs(early=1)
+    if units := branch.system.units:
+        dataset = dataset.assign_attrs(units=str(units))
+        dataset["omega"].attrs["units"] = units.frequency
+        dataset["amplitude"].attrs["units"] = units.name(QUANTITIES["amplitude"].unit)
     kind = getattr(branch, "kind", None)
     if kind is None or branch.plane is None:
         return dataset

@@ -14,7 +14,8 @@ Variables: `displacement`, `velocity`, `acceleration` on `sample` and, with the 
 `amplitude_of_component` on `component`, the complex c_k of `x(t) = Re sum_k c_k exp(i k omega t / nu)`, and
 `amplitude_of_neglected`, the first-order answer to the force of the solved motion; `force` (element x sample), of the
 law; `gap_level` the place of a gap as a value of x, `gap_element` whose it is; `parameters`. Attributes: `omega`,
-`period` (nu), `dof`, `dofs`, `amplitude` (max |x|), `kind` (that of a bifurcation, else empty), `system`.
+`period` (nu), `dof`, `dofs`, `amplitude` (max |x|), `kind` (that of a bifurcation, else empty), `system`, `units`
+(those that it declares, else empty).
 
 All motions of a curve are laid out beside its points and events (`with_motions`), their coefficients with zeros behind
 those of fewer harmonics.
@@ -186,6 +187,7 @@ def motion_dataset(
         "layout": LAYOUT,
         "suboctave": __version__,
         "system": system.name,
+        "units": str(system.units or ""),
         "kind": kind,
         "omega": float(orbit.omega),
         "period": nu,

@@ -26,7 +26,6 @@ application = typer.Typer(
     name="suboctave",
     help="Response curves, stability and bifurcations of vibrating structures with nonlinear parts.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
 )
 _AsJson = Annotated[bool, typer.Option("--json", help="One JSON object on stdout instead of text.")]

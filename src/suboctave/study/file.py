@@ -120,6 +120,8 @@ def read_study(path: str | Path, allow_code: bool = False) -> Study:
     if "system" in sections.model_fields_set:
         section = _validated(SystemSection, sections.system, ("system",), mistakes, rest=True)
         system = make_system(section, source.parent, mistakes, allow_code)
+        with mistakes.at("system"):
+            system = system and system.with_units(section.units)
     steps = _steps(getattr(sections, "analyses", []), system, mistakes, allow_code)
     outputs = _outputs(sections.outputs, steps, system, mistakes)
     mistakes.refuse()

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from suboctave.store.layout import parameter_column
+from suboctave.units import UnitSystem
 
 if TYPE_CHECKING:
     import xarray
@@ -24,9 +26,15 @@ def console(quiet: bool = False) -> Console:
 
 
 def print_events(
-    out: Console, lines: Sequence[Sequence[str]], free: str = "omega", criticality: Sequence[str] = ()
+    out: Console,
+    lines: Sequence[Sequence[str]],
+    free: str = "omega",
+    criticality: Sequence[str] = (),
+    units: UnitSystem | None = None,
 ) -> None:
-    """Located bifurcations as a table, one line each; whether super- or subcritical where that is known of any."""
+    """Located bifurcations as a table, one line each; whether super- or subcritical where that is known of any. With
+    declared units a column more has the frequencies in cycles, Hz where time is in s.
+    """
     if not lines:
         out.print("no bifurcation")
         return
@@ -36,6 +44,9 @@ def print_events(
     if any(criticality):
         names += ("criticality",)
         lines = [[*line, word] for line, word in zip(lines, criticality, strict=True)]
+    if units is not None:
+        names = (names[0], f"omega ({units.frequency})", units.cycles, f"max |x| ({units.length})", *names[3:])
+        lines = [[*line[:2], significant(float(line[1]) / (2.0 * math.pi), 7), *line[2:]] for line in lines]
     print_texts(out, names, lines, left=("kind",))
 
 

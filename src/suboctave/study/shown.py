@@ -58,7 +58,8 @@ def _(branch: Branch, out: Console, note: str) -> None:
             line[0] += f" {contacts[event.contact.element][0]}"
     for words in branch.basis:
         out.print(words, soft_wrap=True)
-    print_events(out, lines, branch.name, [str(word) for word in dataset["event_criticality"].to_numpy()])
+    criticality = [str(word) for word in dataset["event_criticality"].to_numpy()]
+    print_events(out, lines, branch.name, criticality, branch.system.units)
     for number, label in contacts.values() if len(contacts) > 1 else ():
         out.print(f"grazing {number}: {label}")
     out.print(f"{len(branch)} points, {branch.verdicts}{note}; {branch.ended}.")

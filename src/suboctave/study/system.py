@@ -43,6 +43,7 @@ class SystemSection(Section):
     loads: list[dict[str, Any]] = Field(default_factory=list)
     parameters: dict[str, float] = Field(default_factory=dict)
     dof_names: list[str] = Field(default_factory=list)
+    units: str | None = None
 
 
 def published() -> dict[str, Any]:

@@ -9,6 +9,7 @@ gap: so the far side is looked for at a given height, from the last point before
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -17,31 +18,44 @@ from suboctave.continuation import CurvePoint, NewtonOptions
 from suboctave.continuation.linear import length
 from suboctave.continuation.newton import correct
 from suboctave.continuation.point import make_point
-from suboctave.curves.events.grazings import height_gradient
+from suboctave.curves.events.grazings import height_gradient, nearest_extremum
 from suboctave.curves.sample import Sample
 from suboctave.errors import ConvergenceError
+from suboctave.harmonic.orbit import PeriodicOrbit
 
 #: distance from a gap, in units of the motion, at which a contact grazes
 _GRAZES = 1e-3
+#: the same, from which on it is clear on which side of the gap the curve has come
+_CLEAR = 1e-6
+#: angle to the way that the curve has come at which another part of it leads away
+_BACK = 1e-3
+#: phase of the load by which an extremum moves at most on the last steps into a corner
+_MOVED = 0.3
 #: ways in height at which the far side is looked for, the nearest first (what happens before the point found is not
 #: seen), and how far it may lie then, in scaled arclength
 _HEIGHTS, _NEAR = (1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3), 5e-3
 
 
-def beyond_corner(last: Sample, newton: NewtonOptions) -> tuple[CurvePoint | None, str] | None:
-    """A point behind a corner and what to say of it; no point where none is found, None where no contact grazes."""
+def beyond_corner(
+    last: Sample, before: Iterable[PeriodicOrbit], newton: NewtonOptions
+) -> tuple[CurvePoint | None, str] | None:
+    """A point behind a corner and what to say of it; no point where none is found, None where no contact grazes.
+
+    `before`: the motions up to there, the last first.
+    """
     grazing = _grazing(last)
     if grazing is None:
         return None
     gap, at, height = grazing
-    label = last.state.local(gap.element).element.label
+    label, clear = last.state.local(gap.element).element.label, _CLEAR * float(np.abs(last.state.x).max())
+    coming = next((h for h in (_height(orbit, gap, at) for orbit in before) if abs(h) > clear), height)
     point, curve, where = last.point, last.curve, last.where
     by_x, rates = height_gradient(last.state, gap.element, gap.index, float(gap.tau[at]), curve.names)
     row = curve.join(by_x, rates, np.zeros(curve.augmentation.extras)) / point.weights
     size = length(row)
     row = row / size
-    # the side of the gap from which the extremum comes
-    coming = -float(row @ (point.weights * point.tangent))
+    along = point.weights * point.tangent
+    along = along / length(along)
     for way in _HEIGHTS:
         rise = -math.copysign(way * size, coming) - height
         if rise * coming >= 0.0 or abs(rise) < 0.5 * way * size:
@@ -51,7 +65,8 @@ def beyond_corner(last: Sample, newton: NewtonOptions) -> tuple[CurvePoint | Non
         try:
             solved = correct(curve, guess, row, point.weights, newton)
             away = point.weights * (solved.u - point.u)
-            if length(away) < _NEAR:
+            # not back along the curve itself
+            if length(away) < _NEAR and length(away / length(away) + along) > _BACK:
                 # behind a corner the extremum moves on from the gap; what led there may be most of the way
                 ahead = math.copysign(1.0, rise) * row / point.weights
                 new = make_point(solved, curve, ahead, point.arclength + length(away))
@@ -66,3 +81,13 @@ def _grazing(sample: Sample) -> tuple[GapExtrema, int, float] | None:
     heights = [(gap, i, h) for gap in gap_extrema(sample.state) for i, h in enumerate((gap.value - gap.level).tolist())]
     nearest = min(heights, key=lambda item: abs(item[2]), default=None)
     return nearest if nearest and abs(nearest[2]) <= _GRAZES * float(np.abs(sample.state.x).max()) else None
+
+
+def _height(orbit: PeriodicOrbit, gap: GapExtrema, at: int) -> float:
+    """Height of the same extremum on another motion; 0 where there is none."""
+    tau = float(gap.tau[at])
+    same = nearest_extremum(orbit.state(), gap.element, gap.index, tau, bool(gap.curve[at] < 0.0))
+    # where it was not born yet another one is the nearest
+    if same is None or math.cos(float(same[0].tau[same[1]]) - tau) < math.cos(_MOVED):
+        return 0.0
+    return float(same[0].value[same[1]] - same[0].level)

@@ -400,7 +400,13 @@ class StepWatch(Steps):
         warnings += [f"{stretch}: a smaller max_step may tell" for stretch in joined(step.unsettled)]
         self.keep(step.samples)
         self._functions = {s: known for s, known in self._functions.items() if s in self._behind}
-        return events_between(step.inside, self.tests, self.newton, warnings)
+        # parameters turn in a corner, see `follow`; the function of cusps jumps there
+        tests = tuple(test for test in self.tests if not (step.corner and isinstance(test, Extremum | Cusp)))
+        return events_between(step.inside, tests, self.newton, warnings)
+
+    def over_corner(self, a: Sample, b: Sample) -> bool:
+        """Whether limit points turn back abruptly in a step."""
+        return self._examined(a, b).corner
 
     def parted(self, p: Sample, q: Sample) -> bool:
         # determinants and null vectors belong to a discretisation
@@ -444,6 +450,16 @@ class _Step(Interior):
             if again is not first and test.changed(first, again) and test.changed(again, second):
                 # of a pair that the change of harmonics may have brought about, or hidden, nothing is seen
                 self.unsettled.append(unsettled(first, second, reason))
+        # not over a corner, if it can be halved
+        self.refused = self.refused or self.corner
+
+    @property
+    def corner(self) -> bool:
+        """Whether limit points turn back where a contact grazes: as at a cusp in both parameters, but abruptly."""
+        if not any(isinstance(test, Cusp) for test in self.steps.tests):
+            return False
+        pairs = itertools.pairwise(self.inside)
+        return any(all(p.slopes[n] * q.slopes[n] < 0.0 for n in p.slopes) and self.steps.grazes(p, q) for p, q in pairs)
 
     def measures(self, sample: Sample) -> Array:
         return self.steps.functions(sample)

@@ -113,7 +113,8 @@ class _Tracker(Driver):
         if last is None or self.corners >= _CORNERS:
             return None
         self.corners += 1
-        corner = beyond_corner(last, self.settings.newton)
+        before = (p.orbit for p in reversed(self.trace.points))
+        corner = beyond_corner(last, before, self.settings.newton)
         if corner is None:
             return None
         point, note = corner
@@ -202,6 +203,8 @@ class _Tracker(Driver):
             return Ending(EndReason.MOTIONS_END, detail=end.reason)
         new = self._smooth(a, new)
         self._take(self.watch.passed(a, new, self.trace.warnings))
+        if self.watch.over_corner(a, new):
+            self._turn_at_corner(a, new.point)
         self._add(new)
         self.previous = new
         self._report(point)

@@ -269,7 +269,8 @@ class RegimeMap(PlaneMap):
         cells, regimes = self.raster(900, 700)
         labels = [(str(r).replace(" x ", " \u00d7 "), r.motions, r.beyond) for r in regimes]
         lines = list(self._lines())
-        plane = (self.omega, self.bounds), ("omega", self.parameter)
+        units = self.system.units
+        plane = (self.omega, self.bounds), (f"omega ({units.frequency})" if units else "omega", self.parameter)
         return plot_regimes(cells, labels, lines, *plane, path=path, **options)
 
     def _lines(self) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:

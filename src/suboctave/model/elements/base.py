@@ -90,12 +90,15 @@ class BaseElement(Recorded, ABC, family="element"):
     own_nodes
         Whether it is integrated at instants of its own, chosen for it alone (`sampling` tells them), instead of
         together with the others along the same direction.
+    glyph
+        How a schematic draws it: "spring", "damper", "stop", "friction" or "law".
     """
 
     coefficient_names: tuple[str, ...] = ()
     depends_on_velocity: bool = False
     depends_on_time: bool = False
     own_nodes: bool = False
+    glyph: str = "law"
 
     def __init__(
         self,

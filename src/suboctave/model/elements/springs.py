@@ -24,6 +24,8 @@ class PolynomialSpring(DeclaredElement):
     Powers are positive integers. Unit of `c_p`: force / length^p.
     """
 
+    glyph = "spring"
+
     def __init__(
         self,
         dof: Dof | None = None,

@@ -73,6 +73,7 @@ class _Stops(DeclaredElement):
     """
 
     sides: tuple[int, ...]
+    glyph = "stop"
 
     def __init__(
         self, dof: Dof | None, stiffness: Any, gaps: Mapping[str, Any], regularization: Any, direction: ArrayLike | None

@@ -92,6 +92,7 @@ class QuadraticDamper(WrittenElement):
     between nodes.
     """
 
+    glyph = "damper"
     coefficient_names = ("coefficient",)
     dissipative = coefficient_names
     text = "coefficient*v*abs(v)"
@@ -113,6 +114,7 @@ class TanhFriction(WrittenElement):
     dry friction; nodes are graded towards the reversals, so that their number grows like its logarithm only.
     """
 
+    glyph = "friction"
     coefficient_names = ("force", "velocity")
     dissipative = ("force",)
     text = "force*tanh(v/velocity)"
@@ -153,6 +155,7 @@ class HertzContact(WrittenElement):
     Hunt & Crossley, Coefficient of restitution interpreted as damping in vibroimpact, J. Applied Mechanics 42, 1975.
     """
 
+    glyph = "stop"
     coefficient_names = ("damping", "gap", "stiffness")
     dissipative = ("damping", "stiffness")
 
