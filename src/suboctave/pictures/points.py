@@ -50,6 +50,10 @@ def curve_data(dataset: xarray.Dataset, name: str, verified: Verified | None = N
         "free": list(free),
         "tracked": kind_of(dataset) if is_boundary(dataset) else "",
         "nu": period_of(dataset),
+        "units": {
+            name: str(dataset[name].attrs.get("units", "")) if dataset.attrs.get("units") else ""
+            for name in ("omega", "amplitude")
+        },
         "dof": int(dataset.attrs.get("observed_dof", 0)) if int(dataset.attrs.get("dofs", 1)) > 1 else None,
         "fixed": {one: float(values[one][0][0]) for one in names if one not in varied},
         "points": _places(dataset, "", {one: values[one][0] for one in varied}),

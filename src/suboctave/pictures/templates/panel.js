@@ -73,8 +73,9 @@ function eventHeading(curve, event) {
 function factsOf(curve, vertex, place) {
   const facts = [];
   const names = [...new Set([...curve.free, "omega", ...Object.keys(place.places.values)])];
-  for (const name of names) { facts.push([spelt(name), shown(place.values[name])]); }
-  facts.push([curve.dof === null ? "max |x|" : `max |x_${curve.dof}|`, shown(place.amplitude, 7)]);
+  for (const name of names) { facts.push([spelt(name), `${shown(place.values[name])} ${curve.units[name] || ""}`.trim()]); }
+  const largest = `${shown(place.amplitude, 7)} ${curve.units.amplitude}`.trim();
+  facts.push([curve.dof === null ? "max |x|" : `max |x_${curve.dof}|`, largest]);
   if (place.stable !== null) { facts.push(["stability", place.stable ? "stable" : "unstable"]); }
   if (place.multipliers.length) {
     const [re, im] = place.multipliers.reduce((a, b) => (Math.hypot(...b) > Math.hypot(...a) ? b : a));
