@@ -195,7 +195,7 @@ def test_what_is_written(ran):
     assert {p.name for p in folder.iterdir()} == {p.name for p in outcome.files} == names
     assert "computed, 4T" in (folder / "named.svg").read_text()
     page = (folder / "report.html").read_text(encoding="utf-8")
-    assert page.count("<h2>diagram, branch ") == 3
+    assert page.count('<h3 class="name">diagram, branch ') == 3
     assert "└─ 1  2T, PD 3.981602 to PD 2.39144" in page
 
 
