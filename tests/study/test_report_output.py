@@ -15,8 +15,8 @@ def test_a_report_page_gets_the_curves(study_file, suboctave, monkeypatch):
     report.__spec__ = importlib.machinery.ModuleSpec("suboctave.pictures.report", None)
     got = {}
 
-    def write_report(results, path, *, title, overwrite=False):
-        got.update(names=list(results), title=title, overwrite=overwrite, omega=results["up"]["omega"].size)
+    def write_report(results, path, *, title, overwrite=False, failures=None):
+        got.update(names=list(results), title=title, overwrite=overwrite, omega=results["up"].omega.size)
         Path(path).write_text("<html>")
 
     report.write_report = write_report
