@@ -1,0 +1,94 @@
+"""How the pages of this folder become a site: `make docs`. Nothing is fetched from the network while it is built."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).parent
+sys.path[:0] = [str(HERE.parent / "src"), str(HERE / "_extensions")]
+
+from suboctave.version import __version__  # noqa: E402
+
+project = "suboctave"
+author = "the suboctave authors"
+copyright = "the suboctave authors, BSD-3-Clause"
+version = release = __version__
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx.ext.mathjax",
+    "sphinx-mathjax-offline",
+    "executed",
+]
+exclude_patterns = ["_build", "_extensions"]
+source_suffix = {".md": "markdown"}
+language = "en"
+nitpicky = True
+default_role = "code"
+highlight_language = "none"
+
+myst_enable_extensions = ["amsmath", "attrs_block", "attrs_inline", "colon_fence", "deflist", "dollarmath"]
+myst_heading_anchors = 4
+
+autodoc_member_order = "bysource"
+autodoc_typehints = "none"
+autodoc_preserve_defaults = True
+autodoc_default_options = {"members": True, "undoc-members": False, "show-inheritance": False}
+napoleon_google_docstring = False
+napoleon_use_param = False
+napoleon_use_rtype = False
+napoleon_use_ivar = True
+python_maximum_signature_line_length = 100
+
+html_theme = "pydata_sphinx_theme"
+html_title = f"suboctave {release}"
+html_static_path = ["_static"]
+html_css_files = ["suboctave.css"]
+html_copy_source = False
+html_show_sourcelink = False
+html_theme_options = {
+    "logo": {"text": "suboctave"},
+    "navbar_align": "left",
+    "header_links_before_dropdown": 7,
+    "navigation_with_keys": False,
+    "show_prev_next": True,
+    "secondary_sidebar_items": ["page-toc"],
+    "footer_start": ["copyright"],
+    "footer_end": [],
+    "pygments_light_style": "tango",
+    "pygments_dark_style": "monokai",
+}
+html_sidebars = {"index": [], "changelog": []}
+
+_CODE = re.compile(r"(``.*?``|`[^`]*`)", re.S)
+
+
+def _plain(text: str) -> str:
+    """A line of a docstring for reStructuredText: outside of code no character has a meaning of its own."""
+    parts = _CODE.split(text)
+    plain = [re.sub(r"([*|\\])|(?<=\w)(_)(?!\w)", r"\\\g<0>", part) for part in parts]
+    return "".join(part if i % 2 else plain[i] for i, part in enumerate(parts))
+
+
+def plain_docstrings(app, what, name, obj, options, lines):
+    """Docstrings of the package are plain texts with NumPy's headings and `code`; a star or a bar in them is itself."""
+    code = False
+    made: list[str] = []
+    for i, line in enumerate(lines):
+        indented = line.startswith("    ")
+        if indented and i and not lines[i - 1].strip() and re.search(r"[=()]|^\s+python", line) and not code:
+            if re.match(r"    \S", line):
+                made += ["::", ""]
+                code = True
+        elif line.strip() and not indented:
+            code = False
+        made.append(line if code or set(line) <= {"-", "="} else _plain(line))
+    lines[:] = made
+
+
+def setup(app):
+    app.connect("autodoc-process-docstring", plain_docstrings, priority=100)
