@@ -29,10 +29,10 @@ log = logging.getLogger(__name__)
 
 _INDEX = """# Examples
 
-Each script asks one question, asserts one number with its source, and draws one figure. Figures and texts below were made
-when these pages were built. The scripts are in the folder `examples` of the repository; run one with
-`python examples/ex01_rattling_oscillator.py figure.png`. The figures of a published study, which take longer, are in the
-[gallery](../gallery.md); they were computed before and are kept in the repository.
+Each script asks one question, asserts one number with its source, and draws one figure. Figures and texts below were
+made when these pages were built. The scripts are in the folder `examples` of the repository; run one with
+`python examples/ex01_rattling_oscillator.py figure.png`. The figures of a published study, which take longer, are in
+the [gallery](../gallery.md); they were computed before and are kept in the repository.
 
 {rows}
 
