@@ -1,4 +1,4 @@
-"""docs/messages.md: what it says is printed is in the source, and every failure of an iteration in the source is on it."""
+"""docs/messages.md: what it lists is in the source, and every failure of an iteration in the source is on it."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def trees() -> list[ast.Module]:
 @cache
 def texts() -> tuple[str, ...]:
     found = (_text(node) for tree in trees() for node in ast.walk(tree))
-    return tuple({re.sub(r"\{\w[\w:.]*\}", "{}", text) for text in found if text})
+    return tuple({re.sub(r"\{\w[\w:.]*\}", "{}", text) for text in found if text and " " in text})
 
 
 @cache
