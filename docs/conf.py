@@ -19,7 +19,6 @@ version = release = __version__
 extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
-    "sphinx.ext.napoleon",
     "sphinx.ext.mathjax",
     "sphinx-mathjax-offline",
     "executed",
@@ -28,6 +27,8 @@ exclude_patterns = ["_build", "_extensions"]
 source_suffix = {".md": "markdown"}
 language = "en"
 nitpicky = True
+# Types of attributes that are no public names: they are shown, and have no page.
+nitpick_ignore_regex = [("py:(class|obj|data)", r".*")]
 default_role = "code"
 highlight_language = "none"
 
@@ -36,12 +37,7 @@ myst_heading_anchors = 4
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"
-autodoc_preserve_defaults = True
-autodoc_default_options = {"members": True, "undoc-members": False, "show-inheritance": False}
-napoleon_google_docstring = False
-napoleon_use_param = False
-napoleon_use_rtype = False
-napoleon_use_ivar = True
+autodoc_default_options = {"members": True}
 python_maximum_signature_line_length = 100
 
 html_theme = "pydata_sphinx_theme"
@@ -76,17 +72,19 @@ def _plain(text: str) -> str:
 
 def plain_docstrings(app, what, name, obj, options, lines):
     """Docstrings of the package are plain texts with NumPy's headings and `code`; a star or a bar in them is itself."""
-    code = False
     made: list[str] = []
+    code = False
     for i, line in enumerate(lines):
-        indented = line.startswith("    ")
-        if indented and i and not lines[i - 1].strip() and re.search(r"[=()]|^\s+python", line) and not code:
-            if re.match(r"    \S", line):
-                made += ["::", ""]
-                code = True
-        elif line.strip() and not indented:
+        if line and set(line) == {"-"} and i and len(line) == len(lines[i - 1]):
+            made[-1:] = [f".. rubric:: {lines[i - 1]}", ""]
+            continue
+        starts = line.startswith("    ") and i > 1 and not lines[i - 1].strip() and not lines[i - 2].startswith(" ")
+        if starts and not code:  # an indented block behind a paragraph is code or a formula
+            made += ["::", ""]
+            code = True
+        elif line.strip() and not line.startswith(" "):
             code = False
-        made.append(line if code or set(line) <= {"-", "="} else _plain(line))
+        made.append(line if code else _plain(line))
     lines[:] = made
 
 
