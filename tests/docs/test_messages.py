@@ -6,6 +6,7 @@ import ast
 import re
 from functools import cache
 
+import pytest
 from pages import DOCS, check_prints
 
 import suboctave
@@ -109,6 +110,41 @@ def test_the_page_has_every_failure_of_an_iteration():
 
 def _known(text: str) -> bool:
     return any(matches(pattern, text) for pattern in patterns()) or any(one in text for one in INTERNAL)
+
+
+#: modules that print sentences about what was not settled, all of which are on the page
+SENTENCES = (
+    *("curves/follow.py", "curves/guard.py", "curves/interior.py", "curves/ledgers.py", "curves/refine.py"),
+    *("curves/tracked/corners.py", "curves/tracked/ends.py", "curves/tracked/follow.py", "floquet/hill.py"),
+    *("maps/regimes/verb.py", "timedomain/flow.py"),
+)
+#: parts of sentences that are on the page
+PARTS = (
+    "it must return a finite number",
+    "they are not good enough, more are needed",
+    "the map holds what had been found",
+)
+
+
+def _sentences(module: str) -> list[str]:
+    """Texts of six words and more but docstrings and what is said of wrong input."""
+    tree = ast.parse((SOURCE / module).read_text(encoding="utf-8"))
+    left_out: set[int] = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Module | ast.FunctionDef | ast.ClassDef) and isinstance(node.body[0], ast.Expr):
+            left_out.add(id(node.body[0].value))
+        if isinstance(node, ast.JoinedStr):
+            left_out |= {id(part) for part in node.values}
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "InputError":
+            left_out |= {id(part) for part in ast.walk(node)}
+    found = (_text(node) for node in ast.walk(tree) if id(node) not in left_out and not isinstance(node, ast.BinOp))
+    return [text for text in found if text and len(re.findall(r"[a-z]{2,}", text)) >= 6]
+
+
+@pytest.mark.parametrize("module", SENTENCES)
+def test_the_page_has_what_a_module_says(module):
+    missing = [text for text in _sentences(module) if not _known(text) and not any(part in text for part in PARTS)]
+    assert not missing, "\n".join(missing)
 
 
 def test_what_is_called_internal_is_in_the_source():
