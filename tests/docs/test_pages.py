@@ -31,8 +31,8 @@ so.Results({"response": curve}, {"title": "a study"}).save("results.nc")
     "results.md": """
 import suboctave as so
 
-system = so.library.reference_oscillator(p=0.55, j=0.0)
-diagram = so.bifurcation_diagram(system, (4.1, 2.2), depth=1, harmonics=9)
+system = so.library.reference_oscillator(p=1.7, j=0.0)
+diagram = so.bifurcation_diagram(system, (4.1, 2.2), depth=2, harmonics=9)
 diagram[0].branch.save("curve.nc")
 so.Results({"response": diagram[0].branch, "diagram": diagram}, {"title": "a study"}).save("results.nc")
 """,
