@@ -53,3 +53,7 @@ def test_its_example_names_it(name):
 
 def test_the_list_of_the_reference_names_all():
     assert all(f"`{name}`" in PAGES["index"] for name in suboctave.__all__)
+
+
+def test_the_citation_is_of_this_version():
+    assert f"\nversion: {suboctave.__version__}\n" in (DOCS.parent / "CITATION.cff").read_text(encoding="utf-8")
