@@ -9,6 +9,7 @@ from pathlib import Path
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE.parent / "src"), str(HERE / "_extensions")]
 
+import suboctave  # noqa: E402
 from suboctave.version import __version__  # noqa: E402
 
 project = "suboctave"
@@ -63,11 +64,17 @@ html_sidebars = {"index": [], "messages": []}  # no pages below them
 _CODE = re.compile(r"(``.*?``|`[^`]*`)", re.S)
 
 
+def _linked(code: str) -> str:
+    """Code of a docstring; a public name leads to its place in the reference."""
+    name = code.strip("`")
+    return f":py:obj:`{name} <suboctave.{name}>`" if name in suboctave.__all__ else code
+
+
 def _plain(text: str) -> str:
     """A line of a docstring for reStructuredText: outside of code no character has a meaning of its own."""
     parts = _CODE.split(text)
     plain = [re.sub(r"([*|\\])|(?<=\w)(_)(?!\w)", r"\\\g<0>", part) for part in parts]
-    return "".join(part if i % 2 else plain[i] for i, part in enumerate(parts))
+    return "".join(_linked(part) if i % 2 else plain[i] for i, part in enumerate(parts))
 
 
 def plain_docstrings(app, what, name, obj, options, lines):
@@ -88,5 +95,21 @@ def plain_docstrings(app, what, name, obj, options, lines):
     lines[:] = made
 
 
+_FENCED = re.compile(r"(^```.*?^```)", re.M | re.S)
+_NAMED = re.compile(r"(?<!\[)`so\.(\w+)(\([^`]*\))?`(?!\])")
+
+
+def linked_names(app, docname, source):
+    """`so.name` in a page leads to its place in the reference."""
+
+    def link(match):
+        name, call = match[1], match[2] or ""
+        return f"{{py:obj}}`so.{name}{call} <suboctave.{name}>`" if name in suboctave.__all__ else match[0]
+
+    parts = _FENCED.split(source[0])
+    source[0] = "".join(part if i % 2 else _NAMED.sub(link, part) for i, part in enumerate(parts))
+
+
 def setup(app):
+    app.connect("source-read", linked_names)
     app.connect("autodoc-process-docstring", plain_docstrings, priority=100)
