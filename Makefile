@@ -2,6 +2,7 @@
 # make test      lint, then the tests (a few minutes at most)
 # make test-all  lint, then all tests, the long ones too
 # make lint      ruff and mypy
+# make docs      the documentation as a site, docs/_build/html; runs the examples (some minutes the first time)
 # make clean     remove the environment and everything generated
 #
 # Needs Python (3.11 or newer) and make. Everything is installed into .venv of this folder.
@@ -22,7 +23,7 @@ export MPLBACKEND := Agg
 # Two processes, each file of tests in one of them: what a module computes once for its tests stays together.
 TOGETHER := -n 2 --dist loadfile
 
-.PHONY: demo test test-all lint format clean
+.PHONY: demo test test-all lint docs format clean
 
 demo: $(STAMP)
 	@$(BIN)/suboctave demo --out $(DEMO)
@@ -37,6 +38,10 @@ lint: $(STAMP)
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check .
 	@$(BIN)/mypy
+
+docs: $(VENV)/.docs
+	@$(BIN)/python -m sphinx -b html -d docs/_build/doctrees -W --keep-going -n -q docs docs/_build/html
+	@echo "open docs/_build/html/index.html"
 
 format: $(STAMP)
 	@$(BIN)/ruff check --fix .
@@ -62,6 +67,9 @@ $(STAMP): pyproject.toml
 	  && echo "Compiling, once ..." && $(BIN)/suboctave compile \
 	  && touch $(STAMP)
 
+$(VENV)/.docs: $(STAMP)
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev,docs]' && touch $@
+
 clean:
-	rm -rf $(VENV) $(DEMO) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks
+	rm -rf $(VENV) $(DEMO) docs/_build docs/examples build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks
 	find src tests -name __pycache__ -type d -prune -exec rm -rf {} +

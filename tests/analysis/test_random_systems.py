@@ -81,3 +81,21 @@ def test_what_is_in_doubt_at_one_place_is_one_stretch() -> None:
     assert [u.arclength for u in both] == [(0.10, 0.12), (0.5, 0.51)]
     assert both[0].reason == "one; other"
     assert (both[0].first, both[0].last) == (1.10, 1.12)
+
+
+def test_a_border_with_three_corners_closes(systems: ModuleType) -> None:
+    """Behind one of them it comes back beside itself: a step that cuts it off must not head into it again."""
+    description = systems.describe(510, strong=True)
+    load = description["loads"][0]["amplitude"]
+    description["loads"][0]["amplitude"] = "F"
+    response = so.frequency_response(systems.system_of(description, {"F": load}), (1.8, 1.45))
+    border = so.track(response.bifurcations["PD"][0], "F", (0.7 * load, 1.3 * load))
+    assert border.closed
+    met = sorted((event.kind, event.parameter("F") / load) for event in border.bifurcations)
+    # with steps of at most 0.02
+    known = [
+        ("GPD", 0.86254), ("R2", 0.97952), ("R2", 1.2025), ("extremum", 0.78975), ("extremum", 0.89039),
+        ("extremum", 1.21224), ("extremum", 1.21224),
+    ]  # fmt: skip
+    assert [kind for kind, _ in met] == [kind for kind, _ in known]
+    assert [value for _, value in met] == pytest.approx([value for _, value in known], abs=1e-5)
