@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import types
+from html import escape
 
 import matplotlib as mpl
 import pytest
@@ -64,7 +65,7 @@ def notebook(monkeypatch):
             outputs.append(item)
 
     ipython, display = types.ModuleType("IPython"), types.ModuleType("IPython.display")
-    ipython.get_ipython = type("ZMQInteractiveShell", (), {})
+    ipython.get_ipython, ipython.version_info = type("ZMQInteractiveShell", (), {}), (8, 24)
     display.HTML = str
     display.display = lambda item, display_id: Handle()
     monkeypatch.setitem(sys.modules, "IPython", ipython)
@@ -91,3 +92,14 @@ def test_in_a_notebook_figures_are_pictures_of_cells(curve, notebook, monkeypatc
     figure = so.plot(curve)
     assert figure.canvas.manager is None
     assert figure._repr_png_().startswith(b"\x89PNG")
+
+
+def test_results_in_a_notebook_are_their_picture_and_what_they_print(curve):
+    html = curve._repr_html_()
+    assert html.startswith("<img")
+    assert "data:image/svg+xml;base64," in html
+    assert html.endswith(f"<pre>{escape(repr(curve))}</pre>")
+
+
+def test_a_plane_and_a_motion_in_time_have_pictures_too(curve):
+    assert "<img" in so.integrate(curve.system, omega=1.0, periods=2)._repr_html_()

@@ -123,7 +123,7 @@ class Place:
         return None
 
 
-#: squared sine of the angle between tangents below which there is no corner
+#: squared sine of the angle between tangents below which a curve bends, or bends back, without a corner
 _STRAIGHT = 0.01
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import functools
 import inspect
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -42,6 +42,7 @@ from suboctave.model.inputs import (
 from suboctave.model.projected import ProjectedSystem, Recovered, lost_in_words, project
 from suboctave.model.system import System
 from suboctave.options import RunOptions
+from suboctave.pictures.cells import Pictured
 from suboctave.projection import in_basis, small_system
 from suboctave.store.plain import Recorded, flat, recorded, written_system
 from suboctave.store.registry import Codec, Datasets, Stored, register
@@ -405,7 +406,7 @@ def _entries(made: Any) -> Iterator[tuple[str, Any, On]]:
             yield name, kind, places[0] if places else On()
 
 
-class TimeResult(Stored, ABC):
+class TimeResult(Stored, Pictured):
     """A result of time integration: trajectories, sections, diagrams, exponents, basins, tests, verifications.
 
     `contents` says in files what it is, and `picture` which function of `pictures.in_time` draws it. Fields that say

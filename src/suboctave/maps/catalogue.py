@@ -7,7 +7,7 @@ a curve a branch can be followed at any value that the curve reaches.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -32,6 +32,7 @@ from suboctave.interruption import Interruption, pass_on
 from suboctave.maps.pieces import MonotonePiece, pieces_of
 from suboctave.model.inputs import check_bounds, check_count, check_parameter, check_range, check_system
 from suboctave.model.system import System
+from suboctave.pictures.cells import Pictured
 from suboctave.progress import reporting
 from suboctave.results.branch import Branch, TrackedBranch
 from suboctave.results.diagram import BifurcationDiagram
@@ -70,7 +71,7 @@ class SearchRange(NamedTuple):
         return SearchRange(max(low, 0.5 * min([self.low, *inside])), max([self.high, *(p + margin for p in inside)]))
 
 
-class PlaneMap(Stored, ABC):
+class PlaneMap(Stored, Pictured):
     """What is known over a plane of two parameters."""
 
     @abstractmethod

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Iterable, Mapping
 from functools import cached_property
 from operator import attrgetter
@@ -21,6 +21,7 @@ from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.kinds import KINDS
 from suboctave.model.system import System
+from suboctave.pictures.cells import Pictured
 from suboctave.results.readings import BranchReadings, columns, with_readings
 from suboctave.store.layout import parameter_column
 from suboctave.store.plain import padded
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
     from suboctave.results.sweep import SweepPath
 
 
-class CurveTables(Stored, ABC):
+class CurveTables(Stored, Pictured):
     """One curve or several, as tables and as their files."""
 
     @abstractmethod

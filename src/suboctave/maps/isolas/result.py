@@ -21,6 +21,7 @@ from suboctave.interruption import Interruption, limited
 from suboctave.maps.catalogue import SearchRange, branch_through, checked_values
 from suboctave.maps.pieces import MonotonePiece, stable_ranges
 from suboctave.model.system import System
+from suboctave.pictures.cells import Pictured
 from suboctave.results.branch import Branch, TrackedBranch
 from suboctave.results.readings import shared
 from suboctave.store.layout import isolas_dataset, led_by
@@ -238,7 +239,7 @@ def _joined(chain: Sequence[MonotonePiece], bounds: tuple[float, float]) -> Trac
 
 
 @dataclass(eq=False, repr=False)
-class Isolas(Stored, Sequence[Isola]):
+class Isolas(Stored, Pictured, Sequence[Isola]):
     """Isolas in the order of the values at which they are born, and what was learnt on the way.
 
     Attributes
