@@ -38,7 +38,7 @@ ROOMS = [
     "study",
 ]
 # Modules beside the rooms: they belong to everybody and import nothing of ours but each other.
-COMMON = {"atomic", "compiled", "errors", "interruption", "kinds", "lazy", "options", "progress", "version"}
+COMMON = {"atomic", "compiled", "errors", "interruption", "kinds", "lazy", "options", "progress", "version", "workers"}
 # Rooms that are kept even further apart than the order asks.
 APART = {
     # Vibration-free: it follows any curve.
