@@ -66,7 +66,7 @@ def check_workers(workers: Any, scheduler: Any = None) -> int:
     if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
         raise InputError(f"workers={shortened(workers)}: give a whole number of at least 1")
     if scheduler is not None:
-        raise InputError("workers= and scheduler= are given: a cluster has as many workers as it has; leave workers out")
+        raise InputError("workers= and scheduler= are both given: a cluster has its own workers; leave workers out")
     return workers
 
 
@@ -324,11 +324,11 @@ def _on_cluster(function: Function, tasks: Sequence[Any], address: str) -> Itera
                     with suppress(queue.Empty):
                         future = done.get(timeout=_LOOK)
                         break
-                error = future.exception()
-                if isinstance(error, distributed.KilledWorker):
+                failure = future.exception()
+                if isinstance(failure, distributed.KilledWorker):
                     yield futures[future], Lost("every worker of the cluster that computed it died")
-                elif error is not None:
-                    raise error
+                elif failure is not None:
+                    raise failure
                 else:
                     yield futures[future], future.result()
                 future.release()

@@ -1,4 +1,4 @@
-"""The command line: `suboctave new`, `check`, `run`, `show`, `demo`, `compile`.
+"""The command line: `suboctave new`, `check`, `run`, `sweep`, `show`, `demo`, `compile`.
 
 Everything heavy is imported when a command runs, so that `--help` and a mistyped option answer at once. Exit status: 0,
 1 where a computation failed or a time limit ended it, 2 where the user's input is wrong, 130 after Ctrl-C. With
@@ -15,6 +15,7 @@ from typing import Annotated, Any
 
 import typer
 
+from suboctave.atomic import free_place
 from suboctave.errors import InputError, NegativeDampingWarning, SuboctaveError, suggest
 from suboctave.interruption import Interruption
 from suboctave.version import __version__
@@ -57,7 +58,7 @@ def new(
     json_wanted: _AsJson = False,
 ) -> None:
     """Write a commented study file to start from."""
-    from suboctave.atomic import free_place, replace_file
+    from suboctave.atomic import replace_file
     from suboctave.study.screen import console, print_texts
 
     texts = examples()
@@ -178,6 +179,75 @@ def run(
         raise typer.Exit(status)
 
 
+@application.command("sweep")
+def sweep_command(
+    study: Annotated[Path, typer.Argument(help="The study file; its section sweep says what is not said here.")],
+    grid: Annotated[
+        list[str] | None,
+        typer.Option(help="NAME=FROM:TO:COUNT, NAME=FROM:TO:COUNT:log or NAME=1,2,5; once for each parameter."),
+    ] = None,
+    random: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="NAME=uniform:LOW:HIGH, NAME=normal:MEAN:DEVIATION, NAME=triangular:LOW:MODE:HIGH, ... "
+            "(docs/sweeps.md); once for each parameter."
+        ),
+    ] = None,
+    points: Annotated[
+        Path | None, typer.Option(help="A .csv file: a column for each parameter, a row for each point.")
+    ] = None,
+    draws: Annotated[int | None, typer.Option(help="How many points are drawn from the distributions.")] = None,
+    seed: Annotated[int | None, typer.Option(help="From which they are drawn.")] = None,
+    sampling: Annotated[str | None, typer.Option(help='random, "latin hypercube" or sobol.')] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for what is written, in place of the study's.")] = None,
+    csv: Annotated[bool, typer.Option("--csv", help="Write sweep.csv beside sweep.nc.")] = False,
+    workers: Annotated[int | None, typer.Option(help="Processes; one for each core unless told.")] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="A Dask scheduler, tcp://HOST:8786, whose workers compute instead.")
+    ] = None,
+    overwrite: Annotated[bool, typer.Option(help="Replace what an earlier sweep left there.")] = False,
+    resume: Annotated[bool, typer.Option(help="Go on with a sweep that stopped.")] = False,
+    seconds: Annotated[float | None, typer.Option(help="Time limit of the sweep.")] = None,
+    allow_code: _AllowCode = False,
+    json_wanted: _AsJson = False,
+) -> None:
+    """Run a study at many values of its parameters: a grid, a list or random tolerances."""
+    from suboctave.progress import bar
+    from suboctave.study.file import read_study
+    from suboctave.study.outputs import make_folder
+    from suboctave.study.screen import console
+    from suboctave.study.shown import print_sweep, sweep_as_plain
+    from suboctave.study.sweeps.given import parameters_of
+    from suboctave.study.sweeps.verb import sweep
+
+    read = read_study(study, allow_code)
+    asked = parameters_of(grid or (), random or (), points)
+    folder = out if out is not None else read.folder
+    make_folder(folder)
+    path, table = folder / "sweep.nc", folder / "sweep.csv"
+    if csv and not (overwrite or resume):
+        free_place(table)
+    with bar("sweep") as report:
+        result = sweep(
+            read, asked, draws=draws, seed=seed, sampling=sampling, path=path, overwrite=overwrite, resume=resume,
+            workers=workers, scheduler=scheduler, progress=report, seconds=seconds,
+        )  # fmt: skip
+    files = [path, *([result.to_csv(table, overwrite=True)] if csv else [])]
+    screen = console(quiet=json_wanted)
+    print_sweep(screen, result)
+    for file in files:
+        screen.print(f"written: {file}", soft_wrap=True)
+    status = 0
+    if result.interruption is not None:
+        status = INTERRUPTED if result.interruption == Interruption() else FAILED
+        screen.print(f"{result.interruption}; what was computed is kept. Go on with the same command and --resume")
+    elif len(result.failures) == len(result):
+        status = FAILED
+    _answered(json_wanted, {"ok": status == 0, "status": status, "files": files} | sweep_as_plain(result))
+    if status:
+        raise typer.Exit(status)
+
+
 @application.command()
 def show(
     path: Annotated[Path, typer.Argument(help="A results file (.nc), a study file (.toml), or a journal.")],
@@ -207,8 +277,12 @@ def _show_results(path: Path, csv: Path | None, overwrite: bool, allow_code: boo
     from suboctave.study.results import Result, Results, load
     from suboctave.study.screen import console
     from suboctave.study.shown import as_plain, print_result
+    from suboctave.study.sweeps.result import Sweep
 
     results = load(path, allow_code=allow_code)
+    if isinstance(results, Sweep):
+        _show_sweep(path, results, csv, overwrite, json_wanted)
+        return
     if not isinstance(results, Results):
         results = Results({path.stem: results if isinstance(results, Result) else results.to_table()})
     written = write_tables(results, csv, overwrite) if csv is not None else []
@@ -227,9 +301,26 @@ def _show_results(path: Path, csv: Path | None, overwrite: bool, allow_code: boo
         screen.print(f"written: {file}", soft_wrap=True)
 
 
+def _show_sweep(path: Path, result: Any, csv: Path | None, overwrite: bool, json_wanted: bool) -> None:
+    from suboctave.study.outputs import make_folder
+    from suboctave.study.screen import console
+    from suboctave.study.shown import print_sweep, sweep_as_plain
+
+    files = []
+    if csv is not None:
+        make_folder(csv)
+        files.append(result.to_csv(csv / f"{path.stem}.csv", overwrite))
+    if not _answered(json_wanted, sweep_as_plain(result) | {"files": files}):
+        screen = console()
+        print_sweep(screen, result)
+        for file in files:
+            screen.print(f"written: {file}", soft_wrap=True)
+
+
 def _show_study(path: Path, allow_code: bool, json_wanted: bool) -> None:
     from suboctave.study.file import read_study
     from suboctave.study.screen import console
+    from suboctave.study.sweeps.plan import swept
 
     study = read_study(path, allow_code)
     given = {step.name: step.model_dump(mode="json", exclude_unset=True) for step in study.steps}
@@ -244,6 +335,8 @@ def _show_study(path: Path, allow_code: bool, json_wanted: bool) -> None:
     for step in study.steps:
         arguments = (f"{k} = {_written(v)}" for k, v in given[step.name].items() if k not in ("name", "type"))
         screen.print(f"  {step.name}: {step.kind}({', '.join(arguments)})")
+    if study.sweep is not None:
+        screen.print(f"\nsweep over {', '.join(swept(study.sweep))}: suboctave sweep {path}", soft_wrap=True)
     screen.print(f"\noutputs in {study.folder}", soft_wrap=True)
 
 

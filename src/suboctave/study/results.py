@@ -108,7 +108,7 @@ def _summary(item: Result) -> str:
 
 
 def load(path: str | Path, *, allow_code: bool = False, linear: LinearPart | None = None) -> Saved | Results:
-    """Read a results file: the branch, diagram, isolas, map, sweep or result in time saved there, or the `Results` of a study.
+    """Read a results file: what was saved there, a branch, diagram, map, sweep, ..., or the `Results` of a study.
 
     Parameters
     ----------

@@ -39,10 +39,10 @@ def gathered(
     for name, size in sizes.items():
         values = np.full((len(plan), size) if size else len(plan), np.nan)
         for number, row in rows.items():
-            value = row.get(name)
+            value = row.get(name, np.nan)
             if isinstance(value, list):
                 values[number, : len(value)] = value
-            elif value is not None:
+            else:
                 values[number] = value
         owner = next((step for step in sorted(lists, key=len, reverse=True) if name.startswith(f"{step}.")), "")
         more, extent = ((lists.get(owner, "row"),), (size,)) if size else ((), ())

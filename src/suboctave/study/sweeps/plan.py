@@ -46,6 +46,11 @@ class SweepSection(Section):
     listed: int = Field(default=4, ge=1)
 
 
+def swept(section: SweepSection) -> list[str]:
+    """The names of the parameters that a study sweeps over."""
+    return list(section.parameters if isinstance(section.parameters, dict) else section.parameters[0])
+
+
 @dataclass(frozen=True, eq=False)
 class Plan:
     """Where a study is run: `points`, (points, parameters), in the order of `names`.

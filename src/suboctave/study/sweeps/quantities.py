@@ -1,7 +1,6 @@
 """What a sweep keeps of the results of a study at one point: numbers, and lists of the first few numbers.
 
-A quantity is named after its analysis, "response.peak_amplitude". A list is along one of the dimensions of `LISTS`;
-`MEANINGS` says what each quantity is.
+A quantity is named after its analysis, "response.peak_amplitude"; `MEANINGS` says what each is.
 """
 
 from __future__ import annotations
@@ -68,11 +67,6 @@ def quantities(results: Mapping[str, Any], listed: int) -> Row:
     return {f"{name}.{what}": value for name, item in results.items() for what, value in _of(item, listed).items()}
 
 
-def dimension_of(item: Any) -> str:
-    """The dimension along which a result's lists lie."""
-    return "isola" if isinstance(item, Isolas) else "row" if isinstance(item, Table) else "event"
-
-
 @singledispatch
 def _of(item: Any, listed: int) -> Row:
     raise TypeError(f"{type(item).__name__} has no quantities")
@@ -93,7 +87,8 @@ def _(branch: Branch, listed: int) -> Row:
 def _(diagram: BifurcationDiagram, listed: int) -> Row:
     """A diagram: the same over all its branches."""
     branches = [node.branch for node in diagram if len(node.branch)]
-    row: Row = {"branches": len(diagram), "regular": _regular(branches)} | _curves(branches)
+    row: Row = {"branches": len(diagram), "regular": _regular(branches)}
+    row |= _curves(branches)
     row["longest_period"] = max((branch.nu for branch in branches), default=0)
     name = diagram.root.branch.name
     events = [event for branch in branches for event in branch.bifurcations.met]
@@ -105,8 +100,11 @@ def _(isolas: Isolas, listed: int) -> Row:
     """Isolas: how many, and range and ends of the first ones."""
     rows = [isola_row(isola) for isola in isolas][:listed]
     keys = ("period", "from", "to", "born", "born_omega", "merges", "merges_omega")
-    row: Row = {"isolas": len(isolas), "unsettled": len(isolas.notes) + sum(len(isola.notes) for isola in isolas)}
-    return row | {key: [float(one[key]) for one in rows] for key in keys}
+    unsettled = [note for noted in (isolas, *isolas) for note in noted.notes]
+    row: Row = {"isolas": len(isolas), "unsettled": len(unsettled)}
+    for key in keys:
+        row[key] = [float(one[key]) for one in rows]
+    return row
 
 
 @_of.register(Table)
@@ -115,7 +113,7 @@ def _(table: Table, listed: int) -> Row:
     row: Row = {"rows": len(table)}
     for name, column in table.columns.items():
         if column.dtype.kind in "iufb":
-            row[name] = [float(value) for value in column[:listed]]
+            row[name.replace("/", " per ")] = [float(value) for value in column[:listed]]
     return row
 
 
@@ -136,9 +134,11 @@ def _curves(branches: Sequence[Branch]) -> Row:
         "residual": max(float(point.orbit.residual) for branch in branches for point in branch.points),
         "neglected": max(float(np.max(branch.truncation)) for branch in branches),
     }
-    lengths = [_lengths(branch) for branch in branches if not isinstance(branch, TrackedBranch)]
-    whole = sum(length for length, _ in lengths)
-    return row | ({"unstable_share": sum(unstable for _, unstable in lengths) / whole} if whole else {})
+    lengths = np.array([_lengths(branch) for branch in branches if not isinstance(branch, TrackedBranch)])
+    if lengths.size and lengths[:, 0].any():
+        whole, unstable = lengths.sum(axis=0)
+        row["unstable_share"] = float(unstable / whole)
+    return row
 
 
 def _lengths(branch: Branch) -> tuple[float, float]:

@@ -16,7 +16,7 @@ from time import perf_counter
 from typing import Any
 
 from suboctave.atomic import free_place
-from suboctave.errors import InputError, shortened
+from suboctave.errors import InputError, path_of, shortened
 from suboctave.interruption import Interruption
 from suboctave.model.inputs import check_count, timed
 from suboctave.progress import Report, reporting
@@ -109,6 +109,8 @@ def sweep(
     if place is not None and resume and place.exists() and not _journal_of(place).exists():
         return _complete(place, key, read.allow_code)
     lists = {step.name: _LISTS[step.gives] for step in read.steps}
+    for torn in () if place is None else place.parent.glob(f".{place.name}-*.part"):  # half a file of a killed sweep
+        torn.unlink(missing_ok=True)
     with reporting(progress, read.title or "sweep") as report, _kept(place, key, overwrite, resume) as kept:
         interruption = _compute(AtPoint(read, most, measure), plan, kept, count, scheduler, report)
         result = gathered(plan, kept.computed, lists, most, attributes, interruption)
@@ -178,13 +180,13 @@ def _journal_of(place: Path) -> Path:
 
 def _free(path: str | Path, overwrite: bool, resume: bool) -> Path:
     """Where results go; InputError where something is there that is neither to be replaced nor gone on with."""
-    place = free_place(path, overwrite or resume, (".nc",))
+    place = path_of(path)
     if _journal_of(place).exists() and not (overwrite or resume):
         raise InputError(
             f"{_journal_of(place)} holds a sweep that did not finish: go on with it (resume=True, --resume), or start "
             "anew (overwrite=True, --overwrite)"
         )
-    return place
+    return free_place(place, overwrite or resume, (".nc",))
 
 
 def _complete(place: Path, key: str, allow_code: bool) -> Sweep:
@@ -266,4 +268,3 @@ def duration(seconds: float) -> str:
     if seconds < 90:
         return f"{seconds:.0f} s"
     return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"
-
