@@ -179,22 +179,27 @@ def run(
         raise typer.Exit(status)
 
 
+_Grid = Annotated[
+    list[str] | None,
+    typer.Option("--grid", help="NAME=FROM:TO:COUNT, NAME=FROM:TO:COUNT:log or NAME=1,2,5; once for each parameter."),
+]
+_Random = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--random",
+        help="NAME=uniform:LOW:HIGH, NAME=normal:MEAN:DEVIATION, NAME=triangular:LOW:MODE:HIGH, ... (docs/sweeps.md); "
+        "once for each parameter.",
+    ),
+]
+
+
 @application.command("sweep")
 def sweep_command(
     study: Annotated[Path, typer.Argument(help="The study file; its section sweep says what is not said here.")],
-    grid: Annotated[
-        list[str] | None,
-        typer.Option(help="NAME=FROM:TO:COUNT, NAME=FROM:TO:COUNT:log or NAME=1,2,5; once for each parameter."),
-    ] = None,
-    random: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="NAME=uniform:LOW:HIGH, NAME=normal:MEAN:DEVIATION, NAME=triangular:LOW:MODE:HIGH, ... "
-            "(docs/sweeps.md); once for each parameter."
-        ),
-    ] = None,
+    grid: _Grid = None,
+    random: _Random = None,
     points: Annotated[
-        Path | None, typer.Option(help="A .csv file: a column for each parameter, a row for each point.")
+        Path | None, typer.Option(help="A .csv file: a column for each parameter, a row a point.")
     ] = None,
     draws: Annotated[int | None, typer.Option(help="How many points are drawn from the distributions.")] = None,
     seed: Annotated[int | None, typer.Option(help="From which they are drawn.")] = None,
@@ -212,27 +217,34 @@ def sweep_command(
     json_wanted: _AsJson = False,
 ) -> None:
     """Run a study at many values of its parameters: a grid, a list or random tolerances."""
-    from suboctave.progress import bar
     from suboctave.study.file import read_study
     from suboctave.study.outputs import make_folder
-    from suboctave.study.screen import console
-    from suboctave.study.shown import print_sweep, sweep_as_plain
     from suboctave.study.sweeps.given import parameters_of
-    from suboctave.study.sweeps.verb import sweep
 
     read = read_study(study, allow_code)
     asked = parameters_of(grid or (), random or (), points)
     folder = out if out is not None else read.folder
     make_folder(folder)
-    path, table = folder / "sweep.nc", folder / "sweep.csv"
-    if csv and not (overwrite or resume):
+    table = folder / "sweep.csv" if csv else None
+    if table is not None and not (overwrite or resume):
         free_place(table)
+    options = {
+        "draws": draws, "seed": seed, "sampling": sampling, "path": folder / "sweep.nc", "workers": workers,
+        "scheduler": scheduler, "overwrite": overwrite, "resume": resume, "seconds": seconds,
+    }  # fmt: skip
+    _sweep(read, asked, options, table, json_wanted)
+
+
+def _sweep(study: Any, asked: Any, options: dict[str, Any], table: Path | None, json_wanted: bool) -> None:
+    """Run a sweep, print what came of it, and end with the exit status that says so."""
+    from suboctave.progress import bar
+    from suboctave.study.screen import console
+    from suboctave.study.shown import print_sweep, sweep_as_plain
+    from suboctave.study.sweeps.verb import sweep
+
     with bar("sweep") as report:
-        result = sweep(
-            read, asked, draws=draws, seed=seed, sampling=sampling, path=path, overwrite=overwrite, resume=resume,
-            workers=workers, scheduler=scheduler, progress=report, seconds=seconds,
-        )  # fmt: skip
-    files = [path, *([result.to_csv(table, overwrite=True)] if csv else [])]
+        result = sweep(study, asked, progress=report, **options)
+    files = [options["path"], *([] if table is None else [result.to_csv(table, overwrite=True)])]
     screen = console(quiet=json_wanted)
     print_sweep(screen, result)
     for file in files:

@@ -13,18 +13,19 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import Annotated, Any, Unpack
 
 from suboctave.atomic import free_place
 from suboctave.errors import InputError, path_of, shortened
 from suboctave.interruption import Interruption
 from suboctave.model.inputs import check_count, timed
+from suboctave.options import RunOptions, with_options
 from suboctave.progress import Report, reporting
 from suboctave.store.journal import Journal
 from suboctave.study.file import Study, read_study
 from suboctave.study.results import load
 from suboctave.study.sweeps.gather import gathered
-from suboctave.study.sweeps.plan import Plan, plan_of
+from suboctave.study.sweeps.plan import Plan, SweepSection, plan_of
 from suboctave.study.sweeps.point import AtPoint, Measure
 from suboctave.study.sweeps.result import Computed, Sweep
 from suboctave.version import __version__
@@ -36,29 +37,43 @@ _LISTS = {"branch": "event", "diagram": "event", "isolas": "isola", "table": "ro
 _SUFFIX = ".journal"
 
 
+class SweepOptions(RunOptions, total=False):
+    """Options of `sweep`."""
+
+    draws: Annotated[int | None, "How many points are drawn from the distributions."]
+    seed: Annotated[int | None, "From which they are drawn (0)."]
+    sampling: Annotated[str | None, 'How they are drawn: "random" (default), "latin hypercube" or "sobol".']
+    measure: Annotated[
+        Measure | None,
+        "A function that is given the `Results` of each point at which nothing failed and gives `{name: number}`.",
+    ]
+    listed: Annotated[int | None, "How many bifurcations of a kind, isolas or rows are listed (4); all are counted."]
+    path: Annotated[
+        str | Path | None,
+        "Where the result is saved (.nc). Beside it a journal keeps each point as it is computed, until all are.",
+    ]
+    overwrite: Annotated[bool | None, "Replace what is there."]
+    resume: Annotated[bool | None, "Go on with what an interrupted or killed sweep left at `path`."]
+    workers: Annotated[int | None, "Processes, each on one core; default as many as there are cores."]
+    scheduler: Annotated[
+        str | None,
+        'Address of a Dask scheduler whose workers compute instead, "tcp://host:8786" (extra `cluster`).',
+    ]
+    allow_code: Annotated[bool | None, "Import and call the Python code that the study file names."]
+
+
+@with_options(SweepOptions)
 @timed
 def sweep(
     study: str | Path | Study,
     parameters: Mapping[str, Any] | Sequence[Mapping[str, float]] | None = None,
-    *,
-    draws: int | None = None,
-    seed: int | None = None,
-    sampling: str | None = None,
-    measure: Measure | None = None,
-    listed: int | None = None,
-    path: str | Path | None = None,
-    overwrite: bool = False,
-    resume: bool = False,
-    workers: int | None = None,
-    scheduler: str | None = None,
-    allow_code: bool = False,
-    progress: Any = None,
-    seconds: float | None = None,
+    **options: Unpack[SweepOptions],
 ) -> Sweep:
     """Run a study at many values of its parameters: a grid, a list of points, or draws from distributions.
 
     What comes of a point depends on the study and the point alone: the numbers are the same bits for any number of
-    workers, any order, and after any interruption. A point that fails is noted in words and costs no other.
+    workers, any order, and after any interruption. A point that fails is noted in words and costs no other. A time
+    limit in the study holds for each point, `seconds` for the sweep.
 
     Parameters
     ----------
@@ -70,52 +85,32 @@ def sweep(
         "normal", "mean": 0.5, "deviation": 0.02}`; uniform (low, high), loguniform (low, high), normal (mean,
         deviation), truncated normal (mean, deviation, low, high), lognormal (median, deviation of the logarithm),
         triangular (low, mode, high). `[{name: value, ...}, ...]`, or a pandas table, for a list of points. None: what
-        the study's table [sweep] says, which also gives the defaults of the next three and of `listed`.
-    draws, seed, sampling
-        How many points are drawn, from which seed (0), how: "random", "latin hypercube" or "sobol".
-    measure
-        A function that is given the `Results` of each point at which nothing failed and gives `{name: number}`.
-    listed
-        How many bifurcations of a kind, isolas or rows are listed (4); all are counted.
-    path
-        Where the result is saved (.nc). Beside it a journal keeps each point as it is computed, until all are.
-    overwrite, resume
-        Replace what is there, or go on with what an interrupted or killed sweep left.
-    workers
-        Processes, each on one core; default as many as there are cores.
-    scheduler
-        Address of a Dask scheduler whose workers compute instead, "tcp://host:8786" (extra `cluster`).
-    allow_code
-        Import and call the Python code that the study file names.
-    progress
-        None, True (a bar), or a callable taking (share done, text).
-    seconds
-        Time limit of the sweep; points computed by then are given, as after Ctrl-C (`interrupted`). A limit in the
-        study holds for each point.
-
-    Raises
-    ------
-    InputError
-        Wrong input, before any work.
+        the study's table [sweep] says, which also gives defaults of draws, seed, sampling and listed.
     """
-    count = check_workers(workers, scheduler)
+    count = check_workers(options.get("workers"), options.get("scheduler"))
+    measure, path = options.get("measure"), options.get("path")
+    overwrite, resume = bool(options.get("overwrite")), bool(options.get("resume"))
     if measure is not None and not callable(measure):
         raise InputError(f"measure is a function of the results of a point, not {shortened(measure)}")
-    read = study if isinstance(study, Study) else read_study(study, allow_code)
-    plan, most = _asked(read, parameters, draws, seed, sampling, listed)
-    key = _key(read, plan, most, measure)
-    attributes: dict[str, Any] = {"title": read.title, "study": read.text, "listed": most, "key": key}
+    read = study if isinstance(study, Study) else read_study(study, bool(options.get("allow_code")))
+    plan, listed = _asked(read, parameters, options)
+    key = _key(read, plan, listed, measure)
     place = None if path is None else _free(path, overwrite, resume)
     if place is not None and resume and place.exists() and not _journal_of(place).exists():
         return _complete(place, key, read.allow_code)
+    attributes: dict[str, Any] = {"title": read.title, "study": read.text, "listed": listed, "key": key}
     lists = {step.name: _LISTS[step.gives] for step in read.steps}
-    for torn in () if place is None else place.parent.glob(f".{place.name}-*.part"):  # half a file of a killed sweep
-        torn.unlink(missing_ok=True)
-    with reporting(progress, read.title or "sweep") as report, _kept(place, key, overwrite, resume) as kept:
-        interruption = _compute(AtPoint(read, most, measure), plan, kept, count, scheduler, report)
-        result = gathered(plan, kept.computed, lists, most, attributes, interruption)
+    with (
+        reporting(options.get("progress"), read.title or "sweep") as report,
+        _kept(place, key, overwrite, resume) as kept,
+    ):
+        how = (count, options.get("scheduler"), report)
+        interruption = _compute(AtPoint(read, listed, measure), plan, kept, *how)
+        result = gathered(plan, kept.computed, lists, listed, attributes, interruption)
         result.seconds = perf_counter() - kept.begin
         if place is not None:
+            for torn in place.parent.glob(f".{place.name}-*.part"):  # half a file of a sweep that was killed
+                torn.unlink(missing_ok=True)
             place.unlink(missing_ok=True)
             result.save(place)
             if interruption is None:
@@ -123,25 +118,23 @@ def sweep(
     return result
 
 
-def _asked(
-    study: Study, parameters: Any, draws: int | None, seed: int | None, sampling: str | None, listed: int | None
-) -> tuple[Plan, int]:
+def _asked(study: Study, parameters: Any, options: SweepOptions) -> tuple[Plan, int]:
     """The points, and how many items are listed: as given, else as the study says."""
     section = study.sweep
     if parameters is None and section is None:
         raise InputError(
             "what is swept over? Give parameters, or write a table [sweep] into the study file (docs/sweeps.md)"
         )
-    if section is not None:
-        seed = section.seed if seed is None else seed
-        sampling = section.sampling if sampling is None else sampling
-        listed = section.listed if listed is None else listed
-        if parameters is None:
-            parameters = section.parameters
-            draws = section.draws if draws is None else draws
-    most = check_count("listed", 4 if listed is None else listed)
-    given = (draws, 0 if seed is None else seed, "random" if sampling is None else sampling)
-    return plan_of(study.system, study.steps, parameters, *given), most
+    draws = options.get("draws")
+    if parameters is None and section is not None:
+        parameters = section.parameters
+        draws = section.draws if draws is None else draws
+    default = section or SweepSection(parameters={})
+    seed = default.seed if (given := options.get("seed")) is None else given
+    sampling = options.get("sampling") or default.sampling
+    listed = default.listed if (most := options.get("listed")) is None else most
+    plan = plan_of(study.system, study.steps, parameters, draws, seed, sampling)
+    return plan, check_count("listed", listed)
 
 
 def _key(study: Study, plan: Plan, listed: int, measure: Measure | None) -> str:
