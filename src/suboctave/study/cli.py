@@ -205,7 +205,6 @@ def sweep_command(
     seed: Annotated[int | None, typer.Option(help="From which they are drawn.")] = None,
     sampling: Annotated[str | None, typer.Option(help='random, "latin hypercube" or sobol.')] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for what is written, in place of the study's.")] = None,
-    csv: Annotated[bool, typer.Option("--csv", help="Write sweep.csv beside sweep.nc.")] = False,
     workers: Annotated[int | None, typer.Option(help="Processes; one for each core unless told.")] = None,
     scheduler: Annotated[
         str | None, typer.Option(help="A Dask scheduler, tcp://HOST:8786, whose workers compute instead.")
@@ -225,7 +224,7 @@ def sweep_command(
     asked = parameters_of(grid or (), random or (), points)
     folder = out if out is not None else read.folder
     make_folder(folder)
-    table = folder / "sweep.csv" if csv else None
+    table = folder / "sweep.csv" if read.outputs.csv else None
     if table is not None and not (overwrite or resume):
         free_place(table)
     options = {
