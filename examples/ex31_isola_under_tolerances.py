@@ -1,9 +1,9 @@
 """How likely is an isolated resonance when gap and contact stiffness scatter about their nominal values?
 
-The rattling oscillator has an isolated resonance of twice the period at gaps below 0.58. Gap and stiffness are drawn from
-their tolerances (study_tolerances.toml), and each oscillator is searched for the isola under its load. The share that has
-it estimates the probability, with Wilson's interval. The curve of births in the plane of gap and stiffness, one
-continuation, gives the same probability by an integral, since the isola is there exactly below it.
+The rattling oscillator has an isolated resonance of twice the period at gaps below 0.58. Gap and stiffness are drawn
+from their tolerances (study_tolerances.toml), and each oscillator is searched for the isola under its load. The share
+that has it estimates the probability, with Wilson's interval. The curve of births in the plane of gap and stiffness,
+one continuation, gives the same probability by an integral, since the isola is there exactly below it.
 
     python ex31_isola_under_tolerances.py [figure.png] [--draws 1000]
 """
@@ -17,14 +17,14 @@ from scipy.stats import binomtest, norm
 import suboctave as so
 
 arguments = sys.argv[1:]
-draws = 12
+draws = 8  # for an interval of 0.06 it takes 1000, and half an hour on two cores
 if "--draws" in arguments:
     place = arguments.index("--draws")
     draws = int(arguments[place + 1])
     del arguments[place : place + 2]
 
 study = Path(__file__).with_name("study_tolerances.toml")
-sweep = so.sweep(study, draws=draws, sampling="latin hypercube", progress=True)
+sweep = so.sweep(study, draws=draws, sampling="random", progress=True)
 print(sweep)
 load = 0.55
 there = ((sweep["isolas.from"] <= load) & (load <= sweep["isolas.to"])).any(axis=1)
@@ -57,5 +57,5 @@ if arguments:
 assert np.array_equal(there, sweep["j"] < np.interp(sweep["Kc"], stiffness, gap))
 assert not sweep.failures
 assert interval.low < probability < interval.high
-# By Gauss-Legendre quadrature over 5 births, each located by a search of its own: 0.5309.
-assert abs(probability - 0.5309) < 1e-3, probability
+# Gauss-Legendre quadrature over 4 births, each by a search of its own with 15 harmonics, gives this probability.
+assert abs(probability - 0.52534) < 5e-4, probability

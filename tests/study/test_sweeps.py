@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pages import blocks, check_prints
 from scipy import stats
 
 import suboctave as so
@@ -460,3 +461,9 @@ def test_wrong_options_are_refused(study_file, suboctave, options, words):
     assert status == 2
     assert words in " ".join(err.split())
     assert not out
+
+
+def test_the_page_prints_what_it_says(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "study.toml").write_text(blocks("sweeps.md", "toml")[0])
+    check_prints("sweeps.md", capsys)

@@ -38,7 +38,7 @@ MEANINGS = {
     "regular": "1 where the curve ended regularly (range, closed, met another one), 0 where not",
     "closed": "1 where the curve closed on itself",
     "unstable_share": "share of the curve's length in its free parameter on which motions are unstable",
-    "peak_amplitude": "largest amplitude of the observed degree of freedom",
+    "peak_amplitude": "largest amplitude of the observed degree of freedom at a computed point",
     "peak_omega": "frequency of the largest amplitude",
     "lowest": "lowest value of the free parameter",
     "highest": "highest value of the free parameter",
