@@ -273,30 +273,26 @@ so.sweep(sys.argv[1], {grid}, path=sys.argv[2], resume=True, workers=2)
 """
 
 
-def killed(study, path, delay):
-    """Run the sweep in a process of its own and kill that after some time; how many points it left, None for all."""
+def points_in(path):
+    """How many points the journal of a sweep holds."""
+    journal = path.with_suffix(".journal")
+    return sum(record.kind == "point" for record in read_journal(journal)) if journal.exists() else 0
+
+
+def killed(study, path, points, delay):
+    """Run the sweep in a process of its own and kill that some time after it has computed so many points in all."""
     code = CODE.format(grid=repr(GRID))
     with subprocess.Popen([sys.executable, "-c", code, str(study.source), str(path)]) as process:
-        try:
-            process.wait(delay)
-        except subprocess.TimeoutExpired:
-            process.kill()
-    journal = path.with_suffix(".journal")
-    if not journal.exists():
-        return None if path.exists() else 0
-    return sum(record.kind == "point" for record in read_journal(journal))
+        while process.poll() is None and points_in(path) < points:
+            time.sleep(0.02)
+        time.sleep(delay)
+        process.kill()
 
 
 @POSIX
 def test_a_killed_sweep_goes_on(study, grid, tmp_path):
     path = tmp_path / "sweep.nc"
-    code = CODE.format(grid=repr(GRID))
-    with subprocess.Popen([sys.executable, "-c", code, str(study.source), str(path)]) as process:
-        journal = path.with_suffix(".journal")
-        while not (journal.exists() and any(record.kind == "point" for record in read_journal(journal))):
-            assert process.poll() is None
-            time.sleep(0.02)
-        process.kill()
+    killed(study, path, 1, 0.0)
     assert same(so.sweep(study, GRID, path=path, resume=True, workers=2), grid)
     assert [file.name for file in tmp_path.iterdir()] == ["sweep.nc"]
 
@@ -307,13 +303,13 @@ def test_a_sweep_killed_at_ten_moments_is_the_undisturbed_one(study, grid, tmp_p
     draw = random.Random(5)
     path, left = tmp_path / "sweep.nc", []
     while len(left) < 10:
-        there = killed(study, path, draw.uniform(1.0, 4.0))
-        left.append(there)
-        if there is None:  # complete: it is begun anew
+        killed(study, path, points_in(path) + draw.randint(0, 2), draw.uniform(0.0, 0.3))
+        left.append(points_in(path))
+        if path.exists():  # complete: it is begun anew
             assert same(so.load(path), grid)
             path.unlink()
+    assert any(0 < count < 12 for count in left)
     assert same(so.sweep(study, GRID, path=path, resume=True), grid)
-    assert any(count not in (0, None, 12) for count in left)
 
 
 def test_on_a_dask_cluster_it_is_the_same(study, grid):

@@ -175,6 +175,11 @@ class Catalogue(Work):
         settings_of(system, options)
         return cls(system, name, (low, high), within, harmonics, handed_on(options), check_count("max_curves", most, 1))
 
+    def emptied(self) -> Catalogue:
+        """One for the same with nothing in it, which reports to nobody."""
+        how = (self.harmonics, self.options, self.most)
+        return Catalogue(self.system, self.name, self.bounds, self.omega, *how)
+
     @property
     def span(self) -> float:
         """Width of the parameter's range."""
