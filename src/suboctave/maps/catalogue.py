@@ -37,6 +37,7 @@ from suboctave.results.branch import Branch, TrackedBranch
 from suboctave.results.diagram import BifurcationDiagram
 from suboctave.store.registry import Stored
 from suboctave.store.table import Table
+from suboctave.workers import in_order
 
 if TYPE_CHECKING:
     import pandas
@@ -113,6 +114,11 @@ class Work:
         """Something that could not be settled, listed once."""
         if text not in self.notes:
             self.notes.append(text)
+
+    def take(self, notes: Iterable[str]) -> None:
+        """Note what others could not settle."""
+        for text in notes:
+            self.note(text)
 
     @contextmanager
     def noting(self, what: str, errors: tuple[type[Exception], ...] = (ConvergenceError,)) -> Iterator[None]:
@@ -274,6 +280,31 @@ class Catalogue(Work):
         if piece is None:
             self._lost.append((value, item))
         return piece
+
+
+@dataclass(frozen=True, eq=False)
+class AtValues(ABC):
+    """Something that is looked for at places, such as values of the parameter, at each by itself.
+
+    What is found at one place does not depend on what is found at others: places are divided among processes.
+    `catalogue`: an empty one.
+    """
+
+    catalogue: Catalogue
+
+    @abstractmethod
+    def found(self, catalogue: Catalogue, place: Any) -> list[Any]:
+        """What there is at a place; what cannot be settled is noted in the catalogue."""
+
+    def __call__(self, place: Any) -> tuple[list[Any], list[str]]:
+        own = self.catalogue.emptied()
+        return self.found(own, place), own.notes
+
+    def over(self, places: Sequence[Any], workers: int, noted: Catalogue) -> Iterator[list[Any]]:
+        """What there is at each place, in order; what could not be settled is noted in `noted`."""
+        for found, notes in in_order(self, places, workers):
+            noted.take(notes)
+            yield found
 
 
 def branch_through(

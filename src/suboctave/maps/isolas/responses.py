@@ -5,11 +5,9 @@ What is found at one value does not depend on what is found at others: values ar
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
-from typing import Any
 
 import numpy as np
 
@@ -21,10 +19,9 @@ from suboctave.errors import ConvergenceError
 from suboctave.harmonic.evaluation import HarmonicBalance
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.interruption import pass_on
-from suboctave.maps.catalogue import Catalogue, motion_near
+from suboctave.maps.catalogue import AtValues, Catalogue, motion_near
 from suboctave.model.system import System
 from suboctave.results.branch import Branch
-from suboctave.workers import in_order
 
 #: motions of a branch whose mirror images lead to another one, if there is any
 _IMAGES = 12
@@ -33,33 +30,12 @@ _LEVEL = "load_level"
 
 
 @dataclass(frozen=True, eq=False)
-class AtValues(ABC):
-    """Something that is looked for at values of the parameter, at each by itself.
-
-    `catalogue`: an empty one; `depth`: how many bifurcations deep branches are followed.
+class Responses(AtValues):
+    """Branches that a response leads to, `depth` bifurcations deep, each with whether its period doublings are to be
+    followed.
     """
 
-    catalogue: Catalogue
     depth: int
-
-    @abstractmethod
-    def found(self, catalogue: Catalogue, value: float) -> list[Any]:
-        """What there is at a value; what cannot be settled is noted in the catalogue."""
-
-    def __call__(self, value: float) -> tuple[list[Any], list[str]]:
-        own = self.catalogue.emptied()
-        return self.found(own, value), own.notes
-
-    def over(self, values: Sequence[float], workers: int, noted: Catalogue) -> Iterator[tuple[float, list[Any]]]:
-        """What there is at each value, in order; what could not be settled is noted in `noted`."""
-        for value, (found, notes) in zip(values, in_order(self, values, workers), strict=True):
-            for note in notes:
-                noted.note(note)
-            yield value, found
-
-
-class Responses(AtValues):
-    """Branches that a response leads to, each with whether its period doublings are to be followed."""
 
     def found(self, catalogue: Catalogue, value: float) -> list[tuple[Branch, bool]]:
         """See the class."""
@@ -106,11 +82,12 @@ def _images(branches: list[Branch], catalogue: Catalogue, value: float) -> Itera
 
 @dataclass(frozen=True, eq=False)
 class UnderOtherLoads(AtValues):
-    """Limit points that a level of the loads leads to, as motions at the loads' own level.
+    """Limit points that a level of the loads leads to, `depth` bifurcations deep, as motions at the loads' own level.
 
     Where nothing oscillates but elements there are none.
     """
 
+    depth: int
     level: float
 
     def found(self, catalogue: Catalogue, value: float) -> list[PeriodicOrbit]:

@@ -481,7 +481,7 @@ def _from_responses(search: Search, depth: int, workers: int) -> None:
     catalogue, count = search.catalogue, len(search.values)
     catalogue.progress(0.0, f"{catalogue.name} = {search.values[0]:.6g}")
     found = Responses(catalogue.emptied(), depth).over(list(search.values), workers, catalogue)
-    for number, (value, branches) in enumerate(found, 1):
+    for number, (value, branches) in enumerate(zip(search.values, found, strict=True), 1):
         for branch in followed_doublings(catalogue, value, branches):
             search.attach(Loop(value, branch, search.pieces_on(branch, value), False))
         if number < count:
@@ -501,7 +501,8 @@ def _from_load_levels(search: Search, levels: Sequence[float] | None, depth: int
         if levels is None and search.isolas:
             break
         values = search.few if levels is None else list(search.values)
-        for value, orbits in UnderOtherLoads(catalogue.emptied(), depth, level).over(values, workers, catalogue):
+        found = UnderOtherLoads(catalogue.emptied(), depth, level).over(values, workers, catalogue)
+        for value, orbits in zip(values, found, strict=True):
             catalogue.progress(_PREPARATION, f"{level:g} times the loads at {catalogue.name} = {value:.6g}")
             known = list(search.met.get(value, []))
             for orbit in orbits:
