@@ -155,7 +155,11 @@ class _Seat(threading.Thread):
                 number = self.waiting.popleft()
             except IndexError:
                 break
-            self.answers.put((number, *self._computed(number)))
+            try:
+                answer = self._computed(number)
+            except Exception as error:  # no process can be begun
+                answer = None, error
+            self.answers.put((number, *answer))
         self.stop()
 
     def stop(self) -> None:

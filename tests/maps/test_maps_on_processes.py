@@ -11,7 +11,7 @@ from suboctave.store.files import digest
 from suboctave.store.registry import to_datasets
 
 SYSTEM = so.library.reference_oscillator(p=0.55, j=0.55)
-SEARCH = {"omega": (2.1, 2.6), "parameter": "j", "bounds": (0.5, 0.65), "harmonics": 5, "values": 2}
+SEARCH = {"omega": (2.2, 2.5), "parameter": "j", "bounds": (0.56, 0.6), "harmonics": 3, "values": 2}
 
 
 def digests(item):

@@ -275,8 +275,10 @@ so.sweep(sys.argv[1], {grid}, path=sys.argv[2], resume=True, workers=2)
 
 def points_in(path):
     """How many points the journal of a sweep holds."""
-    journal = path.with_suffix(".journal")
-    return sum(record.kind == "point" for record in read_journal(journal)) if journal.exists() else 0
+    try:
+        return sum(record.kind == "point" for record in read_journal(path.with_suffix(".journal")))
+    except so.InputError:  # not there yet, or being removed
+        return 0
 
 
 def killed(study, path, points, delay):
@@ -342,6 +344,8 @@ def test_a_cluster_that_is_not_there_is_refused(study, monkeypatch):
         ({"F": {"from": 0.1, "too": 0.2, "count": 3}}, {}, "F: there is no 'too' of a range (did you mean 'to'?)"),
         ({"F": {"from": 0.1, "to": 0.2, "count": 1}}, {}, "at least 2 values"),
         ({"F": {"from": -0.1, "to": 0.2, "count": 5, "spacing": "log"}}, {}, "positive ends"),
+        ({"F": {"distribution": ["normal"]}}, {"draws": 3}, "there is no distribution ['normal']"),
+        ({"F": {"from": -1e308, "to": 1e308, "count": 3}}, {}, "F has the value"),
         ({"F": {"distribution": "gauss"}}, {"draws": 3}, "F: there is no distribution 'gauss'"),
         ({"F": {"distribution": "norml"}}, {"draws": 3}, "did you mean 'normal'"),
         ({"F": {"distribution": "normal", "mean": 1.0}}, {"draws": 3}, "the normal distribution needs deviation"),

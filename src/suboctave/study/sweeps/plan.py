@@ -120,6 +120,9 @@ def plan_of(
         refusals.refuse()
         random = any(isinstance(value, Mapping) and "distribution" in value for value in given.values())
         plan = _drawn(given, draws, seed, sampling) if random else _grid(given)
+    if not np.isfinite(plan.points).all():
+        number, column = np.argwhere(~np.isfinite(plan.points))[0]
+        raise InputError(f"{plan.names[column]} has the value {plan.points[number, column]} at point {number}")
     if draws is not None and "draws" not in json.loads(plan.origin):
         raise InputError("draws are of distributions, and no parameter has one: leave draws out", ("draws",))
     _check_extremes(system, plan)
@@ -164,15 +167,15 @@ def _check_values(name: str, value: Any) -> None:
             f"{name}: {shortened(wrong[0])} is no finite number; give numbers, {{from, to, count}}, or {{distribution, "
             "...}"
         )
-    twice = sorted({item for item in values if values.count(item) > 1}) if len(values) < 10_000 else []
-    if twice:
-        raise InputError(f"{name}: the value {twice[0]:g} is given twice")
+    if len(set(values)) < len(values):
+        twice = next(item for place, item in enumerate(values) if item in values[:place])
+        raise InputError(f"{name}: the value {twice:g} is given twice")
 
 
 def _check_distribution(name: str, value: Mapping[str, Any]) -> None:
     kind = value["distribution"]
-    if kind not in DISTRIBUTIONS:
-        raise InputError(f"{name}: there is no distribution {kind!r}{suggest(str(kind), DISTRIBUTIONS)}")
+    if not isinstance(kind, str) or kind not in DISTRIBUTIONS:
+        raise InputError(f"{name}: there is no distribution {shortened(kind)}{suggest(str(kind), DISTRIBUTIONS)}")
     wanted = DISTRIBUTIONS[kind]
     for key in value:
         if key not in (*wanted, "distribution"):
@@ -211,7 +214,8 @@ def _range_values(name: str, value: Mapping[str, Any]) -> np.ndarray:
         raise InputError(f"{name}: spacing is linear or log, not {shortened(spacing)}")
     if spacing == "log" and not (first > 0.0 and last > 0.0):
         raise InputError(f"{name}: a range with spacing log has positive ends")
-    return np.geomspace(first, last, count) if spacing == "log" else np.linspace(first, last, count)
+    with np.errstate(over="ignore", invalid="ignore"):  # values that are not finite are refused
+        return np.geomspace(first, last, count) if spacing == "log" else np.linspace(first, last, count)
 
 
 def _check_count(count: int) -> None:
@@ -248,7 +252,7 @@ def _grid(given: Mapping[str, Any]) -> Plan:
         axes.append(values.astype(float))
     _check_count(int(np.prod([float(len(axis)) for axis in axes])))
     points = np.array(list(itertools.product(*axes)))
-    origin = json.dumps({"grid": {name: axis.tolist() for name, axis in zip(given, axes, strict=True)}})
+    origin = json.dumps({"grid": {name: len(axis) for name, axis in zip(given, axes, strict=True)}})
     return Plan(tuple(given), points, tuple(axes), origin)
 
 

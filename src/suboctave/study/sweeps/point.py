@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Any
@@ -13,7 +13,7 @@ from suboctave.study.file import Study
 from suboctave.study.results import Result, Results
 from suboctave.study.runner import analysed
 from suboctave.study.sweeps.quantities import Row, quantities
-from suboctave.study.sweeps.result import Computed
+from suboctave.study.sweeps.result import OWN, Computed
 
 Measure = Callable[[Results], Mapping[str, float]]
 
@@ -53,17 +53,17 @@ class AtPoint:
                     break
         if self.measure is not None and not failures:
             measured = self.measure(Results(results, {"title": study.title}))
-            row |= _numbers(measured, row)
+            row |= _numbers(measured, (*OWN, *values, *row))
         return failures
 
 
-def _numbers(measured: Any, taken: Mapping[str, Any]) -> Row:
+def _numbers(measured: Any, taken: Collection[str]) -> Row:
     """What a user's function gave, as floats."""
     if not isinstance(measured, Mapping):
         raise InputError(f"measure must give a mapping of names to numbers, not {shortened(measured)}")
     numbers: Row = {}
     for name, value in measured.items():
-        if not isinstance(name, str) or not name or "/" in name or name in ("failure", "seconds", "point", *taken):
+        if not isinstance(name, str) or not name or "/" in name or name in taken:
             raise InputError(f"measure gives {name!r}, which cannot be the name of a quantity, or is one already")
         try:
             numbers[name] = float(value)
