@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import closing
 from dataclasses import replace
 
 import numpy as np
@@ -17,7 +18,7 @@ from pages import blocks, check_prints
 from scipy import stats
 
 import suboctave as so
-from suboctave.store.journal import read_journal
+from suboctave.store.journal import Journal, read_journal
 from suboctave.study.file import read_study
 from suboctave.study.sweeps.given import parameters_of
 from suboctave.study.sweeps.plan import plan_of
@@ -414,6 +415,13 @@ def test_the_command_line_sweeps_shows_and_goes_on(study, grid, study_file, subo
     status, out, _ = suboctave("show", folder / "sweep.nc", "--csv", tmp_path / "tables")
     assert "12 points over F, c" in out
     assert (tmp_path / "tables" / "sweep.csv").read_text() == (folder / "sweep.csv").read_text()
+
+
+def test_the_journal_of_a_sweep_says_how_far_it_came(suboctave, tmp_path):
+    with closing(Journal.create(tmp_path / "sweep.journal")) as journal:
+        journal.append("sweep", {"key": ""})
+        journal.append("point", {"point": 0, "row": {}, "failure": "", "seconds": 1.0})
+    assert "1 point computed" in suboctave("show", tmp_path / "sweep.journal")[1]
 
 
 def test_the_study_file_says_what_is_swept(study_file, suboctave, tmp_path):

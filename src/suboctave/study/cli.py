@@ -358,9 +358,17 @@ def _written(value: Any) -> str:
 
 
 def _show_journal(path: Path, json_wanted: bool) -> None:
+    from suboctave.store.journal import read_journal
     from suboctave.study.runner import recovered
     from suboctave.study.screen import console, print_texts, significant
 
+    kinds = [record.kind for record in read_journal(path)]
+    if "sweep" in kinds:
+        points = kinds.count("point")
+        if not _answered(json_wanted, {"points": points}):
+            text = f"the journal of a sweep that did not finish, {points} point{'s' * (points != 1)} computed"
+            console().print(f"{text}; `suboctave sweep ... --resume` goes on with it", soft_wrap=True)
+        return
     analyses = recovered(path)
     if _answered(json_wanted, {"analyses": [asdict(item) for item in analyses]}):
         return
