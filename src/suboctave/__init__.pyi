@@ -114,5 +114,7 @@ from .structures import (
     read_structure as read_structure,
 )
 from .study.results import Results as Results, load as load
+from .study.sweeps.result import Sweep as Sweep
+from .study.sweeps.verb import sweep as sweep
 from .verification import stability as stability, verify as verify
 from .version import __version__ as __version__

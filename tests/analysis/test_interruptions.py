@@ -19,7 +19,7 @@ from suboctave.results.files import branch_from_dataset, branch_to_dataset
 VERBS = (
     ("basins", "bifurcation_diagram", "brute_force_diagram", "continue_branch", "find_isolas", "find_subharmonics")
     + ("frequency_response", "integrate", "isola_map", "locate_extremum", "lyapunov_exponents", "lyapunov_map")
-    + ("periodic_orbit", "poincare_sections", "regime_map", "stepped_sine", "switch_branch", "track", "verify")
+    + ("periodic_orbit", "poincare_sections", "regime_map", "stepped_sine", "sweep", "switch_branch", "track", "verify")
     + ("design_margin", "equilibria", "limit_cycles", "nonlinear_mode", "phase_resonance", "track_peak")
 )
 

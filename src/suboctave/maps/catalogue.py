@@ -38,6 +38,7 @@ from suboctave.results.branch import Branch, TrackedBranch
 from suboctave.results.diagram import BifurcationDiagram
 from suboctave.store.registry import Stored
 from suboctave.store.table import Table
+from suboctave.workers import in_order
 
 if TYPE_CHECKING:
     import pandas
@@ -115,6 +116,11 @@ class Work:
         if text not in self.notes:
             self.notes.append(text)
 
+    def take(self, notes: Iterable[str]) -> None:
+        """Note what others could not settle."""
+        for text in notes:
+            self.note(text)
+
     @contextmanager
     def noting(self, what: str, errors: tuple[type[Exception], ...] = (ConvergenceError,)) -> Iterator[None]:
         """Note what could not be computed within, and why."""
@@ -175,6 +181,11 @@ class Catalogue(Work):
         rule_of(harmonics)
         settings_of(system, options)
         return cls(system, name, (low, high), within, harmonics, handed_on(options), check_count("max_curves", most, 1))
+
+    def emptied(self) -> Catalogue:
+        """One for the same with nothing in it, which reports to nobody."""
+        how = (self.harmonics, self.options, self.most)
+        return Catalogue(self.system, self.name, self.bounds, self.omega, *how)
 
     @property
     def span(self) -> float:
@@ -270,6 +281,31 @@ class Catalogue(Work):
         if piece is None:
             self._lost.append((value, item))
         return piece
+
+
+@dataclass(frozen=True, eq=False)
+class AtValues(ABC):
+    """Something that is looked for at places, such as values of the parameter, at each by itself.
+
+    What is found at one place does not depend on what is found at others: places are divided among processes.
+    `catalogue`: an empty one.
+    """
+
+    catalogue: Catalogue
+
+    @abstractmethod
+    def found(self, catalogue: Catalogue, place: Any) -> list[Any]:
+        """What there is at a place; what cannot be settled is noted in the catalogue."""
+
+    def __call__(self, place: Any) -> tuple[list[Any], list[str]]:
+        own = self.catalogue.emptied()
+        return self.found(own, place), own.notes
+
+    def over(self, places: Sequence[Any], workers: int, noted: Catalogue) -> Iterator[list[Any]]:
+        """What there is at each place, in order; what could not be settled is noted in `noted`."""
+        for found, notes in in_order(self, places, workers):
+            noted.take(notes)
+            yield found
 
 
 def branch_through(

@@ -1,4 +1,4 @@
-"""The command line: `suboctave new`, `check`, `run`, `show`, `demo`, `compile`.
+"""The command line: `suboctave new`, `check`, `run`, `sweep`, `show`, `demo`, `compile`.
 
 Everything heavy is imported when a command runs, so that `--help` and a mistyped option answer at once. Exit status: 0,
 1 where a computation failed or a time limit ended it, 2 where the user's input is wrong, 130 after Ctrl-C. With
@@ -15,6 +15,7 @@ from typing import Annotated, Any
 
 import typer
 
+from suboctave.atomic import free_place
 from suboctave.errors import InputError, NegativeDampingWarning, SuboctaveError, suggest
 from suboctave.interruption import Interruption
 from suboctave.version import __version__
@@ -56,7 +57,7 @@ def new(
     json_wanted: _AsJson = False,
 ) -> None:
     """Write a commented study file to start from."""
-    from suboctave.atomic import free_place, replace_file
+    from suboctave.atomic import replace_file
     from suboctave.study.screen import console, print_texts
 
     texts = examples()
@@ -230,6 +231,86 @@ def _run(
         raise typer.Exit(status)
 
 
+_Grid = Annotated[
+    list[str] | None,
+    typer.Option("--grid", help="NAME=FROM:TO:COUNT, NAME=FROM:TO:COUNT:log or NAME=1,2,5; once for each parameter."),
+]
+_Random = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--random",
+        help="NAME=uniform:LOW:HIGH, NAME=normal:MEAN:DEVIATION, NAME=triangular:LOW:MODE:HIGH, ... (docs/sweeps.md); "
+        "once for each parameter.",
+    ),
+]
+
+
+@application.command("sweep")
+def sweep_command(
+    study: Annotated[Path, typer.Argument(help="The study file; its section sweep says what is not said here.")],
+    grid: _Grid = None,
+    random: _Random = None,
+    points: Annotated[
+        Path | None, typer.Option(help="A .csv file: a column for each parameter, a row a point.")
+    ] = None,
+    draws: Annotated[int | None, typer.Option(help="How many points are drawn from the distributions.")] = None,
+    seed: Annotated[int | None, typer.Option(help="From which they are drawn.")] = None,
+    sampling: Annotated[str | None, typer.Option(help='random, "latin hypercube" or sobol.')] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for what is written, in place of the study's.")] = None,
+    workers: Annotated[int | None, typer.Option(help="Processes; one for each core unless told.")] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="A Dask scheduler, tcp://HOST:8786, whose workers compute instead.")
+    ] = None,
+    overwrite: Annotated[bool, typer.Option(help="Replace what an earlier sweep left there.")] = False,
+    resume: Annotated[bool, typer.Option(help="Go on with a sweep that stopped.")] = False,
+    seconds: Annotated[float | None, typer.Option(help="Time limit of the sweep.")] = None,
+    allow_code: _AllowCode = False,
+    json_wanted: _AsJson = False,
+) -> None:
+    """Run a study at many values of its parameters: a grid, a list or random tolerances."""
+    from suboctave.study.file import read_study
+    from suboctave.study.outputs import make_folder
+    from suboctave.study.sweeps.given import parameters_of
+
+    read = read_study(study, allow_code)
+    asked = parameters_of(grid or (), random or (), points)
+    folder = out if out is not None else read.folder
+    make_folder(folder)
+    table = folder / "sweep.csv" if read.outputs.csv else None
+    if table is not None and not (overwrite or resume):
+        free_place(table)
+    options = {
+        "draws": draws, "seed": seed, "sampling": sampling, "path": folder / "sweep.nc", "workers": workers,
+        "scheduler": scheduler, "overwrite": overwrite, "resume": resume, "seconds": seconds,
+    }  # fmt: skip
+    _sweep(read, asked, options, table, json_wanted)
+
+
+def _sweep(study: Any, asked: Any, options: dict[str, Any], table: Path | None, json_wanted: bool) -> None:
+    """Run a sweep, print what came of it, and end with the exit status that says so."""
+    from suboctave.progress import bar
+    from suboctave.study.screen import console
+    from suboctave.study.shown import print_sweep, sweep_as_plain
+    from suboctave.study.sweeps.verb import sweep
+
+    with bar("sweep") as report:
+        result = sweep(study, asked, progress=report, **options)
+    files = [options["path"], *([] if table is None else [result.to_csv(table, overwrite=True)])]
+    screen = console(quiet=json_wanted)
+    print_sweep(screen, result)
+    for file in files:
+        screen.print(f"written: {file}", soft_wrap=True)
+    status = 0
+    if result.interruption is not None:
+        status = INTERRUPTED if result.interruption == Interruption() else FAILED
+        screen.print(f"{result.interruption}; what was computed is kept. Go on with the same command and --resume")
+    elif len(result.failures) == len(result):
+        status = FAILED
+    _answered(json_wanted, {"ok": status == 0, "status": status, "files": files} | sweep_as_plain(result))
+    if status:
+        raise typer.Exit(status)
+
+
 @application.command()
 def show(
     path: Annotated[Path, typer.Argument(help="A results file (.nc), a study file (.toml), or a journal.")],
@@ -289,8 +370,12 @@ def _show_results(path: Path, csv: Path | None, overwrite: bool, allow_code: boo
     from suboctave.study.results import Result, Results, load
     from suboctave.study.screen import console
     from suboctave.study.shown import as_plain, print_result
+    from suboctave.study.sweeps.result import Sweep
 
     results = load(path, allow_code=allow_code)
+    if isinstance(results, Sweep):
+        _show_sweep(path, results, csv, overwrite, json_wanted)
+        return
     if not isinstance(results, Results):
         results = Results({path.stem: results if isinstance(results, Result) else results.to_table()})
     written = write_tables(results, csv, overwrite) if csv is not None else []
@@ -309,9 +394,26 @@ def _show_results(path: Path, csv: Path | None, overwrite: bool, allow_code: boo
         screen.print(f"written: {file}", soft_wrap=True)
 
 
+def _show_sweep(path: Path, result: Any, csv: Path | None, overwrite: bool, json_wanted: bool) -> None:
+    from suboctave.study.outputs import make_folder
+    from suboctave.study.screen import console
+    from suboctave.study.shown import print_sweep, sweep_as_plain
+
+    files = []
+    if csv is not None:
+        make_folder(csv)
+        files.append(result.to_csv(csv / f"{path.stem}.csv", overwrite))
+    if not _answered(json_wanted, sweep_as_plain(result) | {"files": files}):
+        screen = console()
+        print_sweep(screen, result)
+        for file in files:
+            screen.print(f"written: {file}", soft_wrap=True)
+
+
 def _show_study(path: Path, allow_code: bool, json_wanted: bool) -> None:
     from suboctave.study.file import read_study
     from suboctave.study.screen import console
+    from suboctave.study.sweeps.plan import swept
 
     study = read_study(path, allow_code)
     given = {step.name: step.model_dump(mode="json", exclude_unset=True) for step in study.steps}
@@ -326,6 +428,8 @@ def _show_study(path: Path, allow_code: bool, json_wanted: bool) -> None:
     for step in study.steps:
         arguments = (f"{k} = {_written(v)}" for k, v in given[step.name].items() if k not in ("name", "type"))
         screen.print(f"  {step.name}: {step.kind}({', '.join(arguments)})")
+    if study.sweep is not None:
+        screen.print(f"\nsweep over {', '.join(swept(study.sweep))}: suboctave sweep {path}", soft_wrap=True)
     screen.print(f"\noutputs in {study.folder}", soft_wrap=True)
 
 
@@ -336,9 +440,17 @@ def _written(value: Any) -> str:
 
 
 def _show_journal(path: Path, json_wanted: bool) -> None:
+    from suboctave.store.journal import read_journal
     from suboctave.study.runner import recovered
     from suboctave.study.screen import console, print_texts, significant
 
+    kinds = [record.kind for record in read_journal(path)]
+    if "sweep" in kinds:
+        points = kinds.count("point")
+        if not _answered(json_wanted, {"points": points}):
+            text = f"the journal of a sweep that did not finish, {points} point{'s' * (points != 1)} computed"
+            console().print(f"{text}; `suboctave sweep ... --resume` goes on with it", soft_wrap=True)
+        return
     analyses = recovered(path)
     if _answered(json_wanted, {"analyses": [asdict(item) for item in analyses]}):
         return

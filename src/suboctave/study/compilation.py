@@ -10,19 +10,19 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from multiprocessing import get_context
 
 import numpy as np
 
 from suboctave.analysis.branches import frequency_response, switch_branch
 from suboctave.analysis.track import track
 from suboctave.compiled import without_notice
+from suboctave.errors import SuboctaveError
 from suboctave.floquet.monodromy import floquet_multipliers
 from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.evaluation import HarmonicBalance
 from suboctave.model import ElasticStop, HarmonicLoad, System, library
 from suboctave.timedomain.flow import Flow
+from suboctave.workers import Lost, completed
 
 Report = Callable[[float, str], None]
 
@@ -79,10 +79,10 @@ def run(number: int) -> None:
 
 def compile_all(report: Report) -> None:
     """Compile every kernel that is not in the cache; `report(share done, what is left)` is called."""
-    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
-        left = {pool.submit(run, number): name for number, (name, _) in enumerate(COMPUTATIONS)}
-        report(0.0, "; ".join(left.values()))
-        for future in as_completed(list(left)):
-            future.result()
-            del left[future]
-            report(1.0 - len(left) / len(COMPUTATIONS), "; ".join(left.values()))
+    left = {number: name for number, (name, _) in enumerate(COMPUTATIONS)}
+    report(0.0, "; ".join(left.values()))
+    for number, result in completed(run, range(len(COMPUTATIONS)), 2):
+        name = left.pop(number)
+        if isinstance(result, Lost):
+            raise SuboctaveError(f"kernels of {name} were not compiled: {result.words}")
+        report(1.0 - len(left) / len(COMPUTATIONS), "; ".join(left.values()))

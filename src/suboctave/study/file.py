@@ -23,6 +23,7 @@ from suboctave.study.figures import FIGURES, Figure, StudyCurves
 from suboctave.study.mistakes import Lines, Mistake, Mistakes, Section, StudyError
 from suboctave.study.outputs import Outputs, check_outputs
 from suboctave.study.steps import STEPS, CheckContext, Known, Step
+from suboctave.study.sweeps.plan import SweepSection, plan_of
 from suboctave.study.system import SystemSection, make_system, overridden
 from suboctave.version import __version__
 
@@ -40,6 +41,7 @@ class StudyFile(Section):
     system: dict[str, Any]
     analyses: list[dict[str, Any]] = Field(min_length=1)
     outputs: dict[str, Any] = Field(default_factory=dict)
+    sweep: dict[str, Any] | None = None
 
 
 @dataclass(frozen=True)
@@ -58,6 +60,8 @@ class Study:
         Whether the user has allowed Python code that the file names.
     seconds
         Time limit for all analyses together; None for none.
+    sweep
+        What is swept over unless `sweep` is given more; None for nothing.
     """
 
     source: Path
@@ -68,6 +72,7 @@ class Study:
     outputs: Outputs
     allow_code: bool = False
     seconds: float | None = None
+    sweep: SweepSection | None = None
 
     @cached_property
     def keys(self) -> dict[str, str]:
@@ -124,10 +129,11 @@ def read_study(path: str | Path, allow_code: bool = False) -> Study:
             system = system and system.with_units(section.units)
     steps = _steps(getattr(sections, "analyses", []), system, mistakes, allow_code)
     outputs = _outputs(sections.outputs, steps, system, mistakes)
+    every = tuple(step for step in steps if step)
+    sweep = _sweep(getattr(sections, "sweep", None), system, every, mistakes)
     mistakes.refuse()
     assert system is not None
-    every = tuple(step for step in steps if step)
-    return Study(source, text, sections.title, system, every, outputs, allow_code, sections.seconds)
+    return Study(source, text, sections.title, system, every, outputs, allow_code, sections.seconds, sweep)
 
 
 def _refused(source: Path, message: str, line: int = 0) -> StudyError:
@@ -225,6 +231,18 @@ def _steps(
         if isinstance(kind, str) and kind in STEPS:
             before[name] = STEPS[kind]
     return steps
+
+
+def _sweep(
+    given: dict[str, Any] | None, system: System | None, steps: tuple[Step, ...], mistakes: Mistakes
+) -> SweepSection | None:
+    section: SweepSection | None = None
+    if given is not None:
+        section = _validated(SweepSection, given, ("sweep",), mistakes)
+    if section is not None and system is not None:
+        with mistakes.at("sweep"):
+            plan_of(system, steps, section.parameters, section.draws, section.seed, section.sampling)
+    return section
 
 
 def _outputs(given: dict[str, Any], steps: list[Step | None], system: System | None, mistakes: Mistakes) -> Outputs:

@@ -18,6 +18,7 @@ from suboctave.results.branch import Branch
 from suboctave.results.diagram import BifurcationDiagram
 from suboctave.store import files, registry
 from suboctave.store.table import Table
+from suboctave.study.sweeps.result import Sweep
 from suboctave.verification import BranchVerification
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 #: what an analysis gives
 Result = Branch | BifurcationDiagram | Isolas | Table
 #: what may be saved besides
-Saved = Result | TimeResult | BranchVerification | IsolaMap | RegimeMap
+Saved = Result | TimeResult | BranchVerification | IsolaMap | RegimeMap | Sweep
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +108,7 @@ def _summary(item: Result) -> str:
 
 
 def load(path: str | Path, *, allow_code: bool = False, linear: LinearPart | None = None) -> Saved | Results:
-    """Read a results file: the branch, diagram, isolas, map or result in time saved there, or the `Results` of a study.
+    """Read a results file: what was saved there, a branch, diagram, map, sweep, ..., or the `Results` of a study.
 
     Parameters
     ----------

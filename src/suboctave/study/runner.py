@@ -11,13 +11,14 @@ those of their curves and closed branches, "part"; before that of a table those 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, closing, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
+from suboctave.analysis.diagram import Keeper
 from suboctave.errors import ConvergenceError, InputError, TimeLimitError
 from suboctave.experiments.common import TimeResult
 from suboctave.interruption import Interruption, check_seconds, time_limit
@@ -235,6 +236,18 @@ def _one(
     if whole and (kept := noted.finished()) is not None:
         result, attributes = kept
         return Finished(step, result, float(attributes.get("seconds", 0.0)), reused=True)
+    with nullcontext() if watch is None else watch(step) as progress:
+        noted.progress = progress
+        done = analysed(study, step, results, noted, noted if whole else None)
+    if done.result is not None and done.interruption is None and whole:
+        noted.finish(done.result, done.seconds)
+    return done
+
+
+def analysed(
+    study: Study, step: Step, results: Mapping[str, Result], progress: Any = None, keeper: Keeper | None = None
+) -> Finished:
+    """Run one analysis, which starts from the results of others: what comes of it, failures in words."""
     missing = [name for _, name in step.needs() if name not in results]
     if missing:
         return Finished(step, None, 0.0, failure=f"it starts from {missing[0]!r}, which gave nothing")
@@ -242,26 +255,21 @@ def _one(
     interruption: Interruption | None = None
     outcome: Result | None = None
     failure, wrong = "", False
-    with nullcontext() if watch is None else watch(step) as progress:
-        try:
-            system = study.system.with_parameters(step.parameters) if step.parameters else study.system
-            noted.progress = progress
-            with time_limit(step.seconds):
-                outcome = step.run(Context(system, results, noted, study.allow_code, noted if whole else None))
-        except KeyboardInterrupt as cause:
-            interruption = Interruption.of(cause)
-        except TimeLimitError as error:
-            failure, interruption = str(error), Interruption(step.seconds)
-        except (ConvergenceError, InputError) as error:
-            failure, wrong = str(error), isinstance(error, InputError)
-        except ArithmeticError as error:  # a size of 1e200 whose square is no number
-            failure = f"the numbers grew too large or too small ({error}): choose units in which they are nearer to 1"
-    seconds = perf_counter() - begin
+    try:
+        system = study.system.with_parameters(step.parameters) if step.parameters else study.system
+        with time_limit(step.seconds):
+            outcome = step.run(Context(system, results, progress, study.allow_code, keeper))
+    except KeyboardInterrupt as cause:
+        interruption = Interruption.of(cause)
+    except TimeLimitError as error:
+        failure, interruption = str(error), Interruption(step.seconds)
+    except (ConvergenceError, InputError) as error:
+        failure, wrong = str(error), isinstance(error, InputError)
+    except ArithmeticError as error:  # a size of 1e200 whose square is no number
+        failure = f"the numbers grew too large or too small ({error}): choose units in which they are nearer to 1"
     if outcome is not None:
         interruption = interruption or outcome.interruption
-        if interruption is None and whole:
-            noted.finish(outcome, seconds)
-    return Finished(step, outcome, seconds, False, failure, wrong, interruption)
+    return Finished(step, outcome, perf_counter() - begin, False, failure, wrong, interruption)
 
 
 # ------------------------------------------------------------------------------------------------------- the journal

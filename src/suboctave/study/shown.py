@@ -21,6 +21,7 @@ from suboctave.store.layout import branch_dataset, events_met
 from suboctave.store.table import Table
 from suboctave.study.results import Result
 from suboctave.study.screen import event_lines, print_events, print_texts
+from suboctave.study.sweeps.result import Sweep
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -160,7 +161,24 @@ def _number(value: Any) -> str:
     return f"{value:.7g}" if abs(value) >= 1e-3 or value == 0.0 else f"{value:.1e}"
 
 
+def print_sweep(out: Console, sweep: Sweep) -> None:
+    """How many points, what failed, and of each quantity the least, median and largest value."""
+    out.print(sweep.title or "sweep", style="bold", end="")
+    note = f" in {sweep.seconds:.2f} s" if sweep.seconds == sweep.seconds else ""
+    _print(sweep.summary(), out, note)
+    for line in sweep.failure_lines():
+        out.print(f"failed at {line}", soft_wrap=True)
+
+
 # ----------------------------------------------------------------------------------------------------- for a machine
+def sweep_as_plain(sweep: Sweep) -> dict[str, Any]:
+    """A sweep as numbers, texts, arrays, lists and mappings."""
+    failures = [{"point": number, "failure": text} for number, text in sweep.failures.items()]
+    whole = {"title": sweep.title, "parameters": list(sweep.parameters), "points": len(sweep)}
+    table = {str(name): column for name, column in sweep.to_table().columns.items()}
+    return whole | {"interrupted": sweep.interrupted, "failures": failures, "columns": table}
+
+
 def as_plain(item: Result) -> dict[str, Any]:
     """A result as numbers, texts, arrays, lists and mappings."""
     if isinstance(item, BifurcationDiagram):

@@ -14,7 +14,7 @@ the range closes: beyond there is no isola. Where only one end is followed no fu
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -38,6 +38,7 @@ from suboctave.model.system import System
 from suboctave.results.branch import TrackedBranch
 from suboctave.store.layout import parameter_column
 from suboctave.store.table import Table
+from suboctave.workers import check_workers, in_order
 
 #: where the map is held against closed branches, in shares of the stretch of the second parameter
 _PROBED = (0.1, 0.5, 0.9)
@@ -53,6 +54,7 @@ def isola_map(
     *,
     probes: int | Sequence[float] = 3,
     max_step: float | None = None,
+    workers: int | None = 1,
     progress: Any = None,
     seconds: float | None = None,
 ) -> IsolaMap:
@@ -69,6 +71,8 @@ def isola_map(
         middle of it, evenly spread; 0 for none; or these values.
     max_step
         As in `track`.
+    workers
+        Processes (None: one for each core) among which the probes are divided. The result is the same bits.
     seconds
         Time limit, after which the map holds the curves that are complete.
 
@@ -103,7 +107,7 @@ def isola_map(
         )
     places = checked_values("probes", probes, (low, high), least=0)
     options = first.options if max_step is None else {**first.options, "max_step": max_step}
-    regions = _Regions(system, name, parameter, (low, high), options)
+    regions = _Regions(system, name, parameter, (low, high), options, check_workers(workers))
     with regions.reporting(progress, f"isolas over {name} and {parameter}"):
         for number, isola in enumerate(items):
             regions.progress(number / len(items), f"isola {number + 1} of {len(items)}")
@@ -132,6 +136,7 @@ class _Regions(Work):
     second: str
     bounds: tuple[float, float]
     options: SearchOptions
+    workers: int
     regions: list[IsolaRegion] = field(default_factory=list)
     tracked: list[tuple[IsolaEnd, TrackedBranch]] = field(default_factory=list)
 
@@ -167,8 +172,8 @@ class _Regions(Work):
         (low, high), reasons, closed, settled = zip(*sides, strict=True)
         span = Span(low, high, both, reasons, closed, settled)
         self.notes += [reason for reason, settled in zip(span.reasons, span.settled, strict=True) if not settled]
-        region = IsolaRegion(isola, second, span, tuple(curves))
-        self.regions.append(replace(region, probes=tuple(self._probes(region, probes))))
+        looks = tuple(self._probes(isola, span, probes))
+        self.regions.append(IsolaRegion(isola, second, span, tuple(curves), looks))
 
     def _curve(self, end: IsolaEnd) -> TrackedBranch:
         """The curve of an extremum, once for all isolas that share it."""
@@ -180,26 +185,38 @@ class _Regions(Work):
         self.tracked.append((end, curve))
         return curve
 
-    # --------------------------------------------------------------------------------------------- independent looks
-    def _probes(self, region: IsolaRegion, probes: Any) -> Iterator[Probe]:
+    def _probes(self, isola: Isola, span: Span, probes: Any) -> Iterator[Probe]:
         """What closed branches at some values of the second parameter say."""
-        span = region.span
         if isinstance(probes, int):
             shares = _PROBED if probes == len(_PROBED) else (np.arange(probes) + 0.5) / max(probes, 1)
             probes = [span.low + float(share) * (span.high - span.low) for share in shares]
         border = next((e for e in span.ends if isinstance(e, MonotonePiece)), None)
         if border is not None:
-            for s in (float(s) for s in probes if span.contains(float(s))):
-                yield self._probe(region, border.nodes[int(np.argmin(np.abs(border.values - s)))])
+            places = [float(s) for s in probes if span.contains(float(s))]
+            nodes = [border.nodes[int(np.argmin(np.abs(border.values - s)))] for s in places]
+            probing = _Probing(self.system, self.name, self.second, self.options, span, isola.omega)
+            yield from in_order(probing, nodes, self.workers)
 
-    def _probe(self, region: IsolaRegion, node: TrackedPoint) -> Probe:
-        """Follow the limit points at one value of the second parameter, and the branch in the middle of the range.
 
-        Nothing of the curves of extrema is used but one motion to begin with.
-        """
-        name, options, orbit = self.name, self.options, node.orbit
+@dataclass(frozen=True, eq=False)
+class _Probing:
+    """Follows the limit points at one value of the second parameter, and the branch in the middle of the range.
+
+    Nothing of the curves of extrema is used but one motion to begin with.
+    """
+
+    system: System
+    name: str
+    second: str
+    options: SearchOptions
+    span: Span
+    omega: tuple[float, float]
+
+    def __call__(self, node: TrackedPoint) -> Probe:
+        """What they say at a motion of a border."""
+        name, options, orbit, span = self.name, self.options, node.orbit, self.span
         place = float(orbit.values[self.second])
-        low, high = region.span.range(place)
+        low, high = span.range(place)
         middle, width = 0.5 * (low + high), high - low
         context = {"system": self.system.with_parameters({self.second: place}), **options}
         start = Bifurcation("LP", orbit, node.floquet, orbit.residual, 0.0, name, context=context)
@@ -210,7 +227,7 @@ class _Regions(Work):
             if not pieces:
                 return Probe(place, middle, (low, high), None, "no limit points there")
             nearest = min(pieces, key=lambda piece: abs(float(piece.across(middle)) - orbit.omega))
-            branch = branch_through(nearest.solve_at(middle), SearchRange(*region.isola.omega), name, pieces, options)
+            branch = branch_through(nearest.solve_at(middle), SearchRange(*self.omega), name, pieces, options)
             pass_on(branch.interruption)
             detached = carrier_of(branch, (), options) is not None
         except FAILURES as failure:
@@ -218,7 +235,7 @@ class _Regions(Work):
         if not detached:
             return Probe(place, middle, (low, high), False, "the branch there is not detached")
         turns = [e.parameter(name) for e in curve.extrema if e.parameter_name == name]
-        ends = [float(end.across(place)) for end in region.span.ends if isinstance(end, MonotonePiece)]
+        ends = [float(end.across(place)) for end in span.ends if isinstance(end, MonotonePiece)]
         missed = [end for end in ends if not any(abs(turn - end) <= _AGREES * width for turn in turns)]
         disagreement = f"its curve of limit points does not turn at {name} = {missed[0]:.7g}" if missed else ""
         return Probe(place, middle, (low, high), True, disagreement)

@@ -23,30 +23,28 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import chain
 from typing import Any, Unpack
 
 import numpy as np
 
 from suboctave.analysis.branches import continue_branch
-from suboctave.analysis.diagram import Followed
 from suboctave.analysis.options import SearchOptions
 from suboctave.analysis.subharmonics import Seeds, check_seeds
 from suboctave.bifurcation.bifurcation import TrackedEvent
-from suboctave.curves.identity import image_of, lies_on, relation
+from suboctave.curves.identity import lies_on
 from suboctave.curves.junction import period_name
-from suboctave.curves.starts import Harmonics, own_linear_part
+from suboctave.curves.starts import Harmonics
 from suboctave.errors import ConvergenceError, InputError, is_number
-from suboctave.harmonic.evaluation import HarmonicBalance
-from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.interruption import pass_on
-from suboctave.maps.catalogue import Catalogue, branch_through, checked_orders, checked_values, listed, motion_near
+from suboctave.maps.catalogue import Catalogue, branch_through, checked_orders, checked_values, listed
+from suboctave.maps.isolas.responses import Responses, UnderOtherLoads, followed_doublings
 from suboctave.maps.isolas.result import Isola, IsolaEnd, Isolas
 from suboctave.maps.pieces import MonotonePiece
 from suboctave.model.inputs import check_count, timed
 from suboctave.model.system import System
 from suboctave.options import with_options
 from suboctave.results.branch import Branch
+from suboctave.workers import check_workers
 
 #: share of the work that the responses make, for progress
 _PREPARATION = 0.6
@@ -394,6 +392,7 @@ def find_isolas(
     search: Sequence[int] | None = None,
     seeds: Seeds | None = None,
     max_curves: int = 64,
+    workers: int | None = 1,
     **options: Unpack[SearchOptions],
 ) -> Isolas:
     """Isolated responses over a design parameter: where each is born, where it merges, the closed branch in between.
@@ -426,6 +425,10 @@ def find_isolas(
         How finely that is done.
     max_curves
         Curves of bifurcations after which no more are followed.
+    workers
+        Processes (None: one for each core) among which the responses at the values, and at other levels of the loads,
+        are divided; curves over the parameter and closed branches, which start from each other, are followed in this
+        one. The result is the same bits.
 
     Returns
     -------
@@ -444,12 +447,13 @@ def find_isolas(
     if isinstance(search_at, int):
         search_at = np.linspace(*catalogue.bounds, search_at).tolist()
     check_count("depth", depth, 0)
+    processes = check_workers(workers)
     other_levels, fine = checked_levels(levels), check_seeds(seeds)
     orders = None if search is None else checked_orders(search, 2)
     state = Search(catalogue, sorted(set(search_at)))
     with catalogue.reporting(options.get("progress"), f"isolas over {parameter}"):
-        _from_responses(state, depth)
-        _from_load_levels(state, other_levels, depth)
+        _from_responses(state, depth, processes)
+        _from_load_levels(state, other_levels, depth, processes)
         _from_resonances(state, orders, fine)
     return state.result()
 
@@ -470,60 +474,23 @@ def checked_levels(levels: Any) -> tuple[float, ...] | None:
 
 #: levels of the loads, and periods of motions, that are tried where nothing else leads to an isola
 _LEVELS, _ORDERS = (1.5, 2.2, 3.2, 4.7), (2,)
-#: motions of a branch whose mirror images lead to another one, if there is any
-_IMAGES = 12
-#: name of the parameter that scales all loads
-_LEVEL = "load_level"
 
 
-def _from_responses(search: Search, depth: int) -> None:
+def _from_responses(search: Search, depth: int, workers: int) -> None:
     """Responses at all values, with what bifurcates from them so many bifurcations deep."""
-    catalogue = search.catalogue
-    for number, value in enumerate(search.values):
-        catalogue.progress(_PREPARATION * number / len(search.values), f"{catalogue.name} = {value:.6g}")
-        for branch in _responses(catalogue, value, depth):
+    catalogue, count = search.catalogue, len(search.values)
+    catalogue.progress(0.0, f"{catalogue.name} = {search.values[0]:.6g}")
+    found = Responses(catalogue.emptied(), depth).over(list(search.values), workers, catalogue)
+    for number, (value, branches) in enumerate(zip(search.values, found, strict=True), 1):
+        for branch in followed_doublings(catalogue, value, branches):
             search.attach(Loop(value, branch, search.pieces_on(branch, value), False))
+        if number < count:
+            catalogue.progress(_PREPARATION * number / count, f"{catalogue.name} = {search.values[number]:.6g}")
     catalogue.progress(_PREPARATION, "closed branches")
     search.settle(search.values)
 
 
-def _responses(catalogue: Catalogue, value: float, depth: int) -> Iterator[Branch]:
-    """Branches at a value that a response leads to, their period doublings followed over the parameter."""
-    for diagram in catalogue.responses(value, catalogue.omega, Followed(depth)):
-        met = [(node.branch, node.depth < depth) for node in diagram]
-        images = ((branch, depth > 0) for branch in _images(diagram.branches, catalogue, value))
-        for branch, doubles in chain(met, images):
-            for item in branch.bifurcations["PD"] if doubles else ():
-                catalogue.known(item, value)
-            yield branch
-
-
-def _images(branches: list[Branch], catalogue: Catalogue, value: float) -> Iterator[Branch]:
-    """Branches through motions beside the mirror images of others.
-
-    What would be two halves of a loop between pitchforks, were the system symmetric, is taken apart by a small load
-    that is not: the response runs over one half, and the other is reached from its image.
-    """
-    low, high = catalogue.omega
-    known = list(branches)
-    for branch in branches:
-        for place in np.linspace(0, len(branch) - 1, min(_IMAGES, len(branch))).round().astype(int):
-            orbit = branch.orbits[place]
-            image = image_of(orbit)
-            if not low <= orbit.omega <= high or relation(orbit, image).one:
-                continue
-            try:
-                motion = motion_near(image, catalogue.at(value), orbit.omega)
-                if any(lies_on(motion, other.points, images=True) for other in known):
-                    continue
-                known.append(continue_branch(motion, "omega", catalogue.omega, **catalogue.options))
-            except ConvergenceError:
-                continue
-            pass_on(known[-1].interruption)
-            yield known[-1]
-
-
-def _from_load_levels(search: Search, levels: Sequence[float] | None, depth: int) -> None:
+def _from_load_levels(search: Search, levels: Sequence[float] | None, depth: int, workers: int) -> None:
     """Responses at other levels of all loads together, in units of their own: most isolas join the main branch there.
 
     Limit points met there are followed over the level to the loads' own one, where they lie on branches of the system
@@ -533,50 +500,18 @@ def _from_load_levels(search: Search, levels: Sequence[float] | None, depth: int
     for level in _LEVELS if levels is None else levels:
         if levels is None and search.isolas:
             break
-        for value in search.few if levels is None else search.values:
+        values = search.few if levels is None else list(search.values)
+        found = UnderOtherLoads(catalogue.emptied(), depth, level).over(values, workers, catalogue)
+        for value, orbits in zip(values, found, strict=True):
             catalogue.progress(_PREPARATION, f"{level:g} times the loads at {catalogue.name} = {value:.6g}")
-            for branch in _under_other_loads(search, value, level, depth):
-                search.meet(branch, value)
-
-
-def _under_other_loads(search: Search, value: float, level: float, depth: int) -> Iterator[Branch]:
-    """Branches at a value that a level of the loads leads to and the search has not met, each once.
-
-    Where nothing oscillates but elements there are none.
-    """
-    catalogue = search.catalogue
-    system = catalogue.at(value)
-    if not any(c.harmonic for c in system.load_components()):
-        return
-    bounds = (min(1.0, level), max(1.0, level))
-    scaled = system.with_scaled_loads(_LEVEL)
-    other = Catalogue(scaled, _LEVEL, bounds, catalogue.omega, catalogue.harmonics, catalogue.options, catalogue.most)
-    try:
-        for branch in _responses(other, level, depth):
-            for item in branch.bifurcations["LP"]:
-                other.known(item, level)
-    finally:
-        for note in other.notes:
-            catalogue.note(f"at {catalogue.name} = {value:.6g}, looking at {level:g} times the loads: {note}")
-    known = list(search.met.get(value, []))
-    for piece in other.limit_points:
-        if not piece.contains(1.0):
-            continue
-        with catalogue.noting(f"at {catalogue.name} = {value:.6g}, a limit point from stronger loads"):
-            orbit = _unscaled(piece.solve_at(1.0).orbit, system)
-            if any(lies_on(orbit, branch.points, images=True) for branch in known):
-                continue
-            bounds = (min(catalogue.omega.low, orbit.omega), max(catalogue.omega.high, orbit.omega))
-            known.append(continue_branch(orbit, "omega", bounds, **catalogue.options))
-            yield known[-1]
-
-
-def _unscaled(orbit: PeriodicOrbit, system: System) -> PeriodicOrbit:
-    """A motion of the system with scaled loads, at their own level, as one of the system itself."""
-    values = {name: value for name, value in orbit.values.items() if name != _LEVEL}
-    balance = HarmonicBalance(system, orbit.basis, linear=own_linear_part(orbit))
-    balance = balance.settle(orbit.x, orbit.omega)
-    return PeriodicOrbit(balance, orbit.x, orbit.omega, values, orbit.residual, orbit.truncation, orbit.adaptive)
+            known = list(search.met.get(value, []))
+            for orbit in orbits:
+                if any(lies_on(orbit, branch.points, images=True) for branch in known):
+                    continue
+                with catalogue.noting(f"at {catalogue.name} = {value:.6g}, a limit point from stronger loads"):
+                    bounds = (min(catalogue.omega.low, orbit.omega), max(catalogue.omega.high, orbit.omega))
+                    known.append(continue_branch(orbit, "omega", bounds, **catalogue.options))
+                    search.meet(known[-1], value)
 
 
 def _from_resonances(search: Search, orders: Sequence[int] | None, seeds: Seeds | None) -> None:

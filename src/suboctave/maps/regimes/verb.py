@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise, product
+from itertools import pairwise, product, repeat
 from typing import Any, Unpack
 
 import numpy as np
@@ -32,7 +32,15 @@ from suboctave.curves.starts import Harmonics
 from suboctave.errors import InputError, is_number, shortened
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.interruption import pass_on, unlimited
-from suboctave.maps.catalogue import FAILURES, MOST_VALUES, Catalogue, SearchRange, branch_through, checked_orders
+from suboctave.maps.catalogue import (
+    FAILURES,
+    MOST_VALUES,
+    AtValues,
+    Catalogue,
+    SearchRange,
+    branch_through,
+    checked_orders,
+)
 from suboctave.maps.isolas.result import Isolas
 from suboctave.maps.pieces import MonotonePiece, Stretch, same_branch, stretches
 from suboctave.maps.regimes.arcs import Arc, Edge, Slice, Strip
@@ -41,6 +49,8 @@ from suboctave.model.inputs import check_count, timed
 from suboctave.model.system import System
 from suboctave.options import with_options
 from suboctave.results.branch import Branch, TrackedBranch
+from suboctave.results.diagram import BifurcationDiagram
+from suboctave.workers import check_workers, in_order
 
 #: a multiplier this close to -1 asks for slices beside it, as far as this share of the range apart
 _NEARLY, _FINE = 0.6, 1.0 / 32.0
@@ -74,6 +84,7 @@ def regime_map(
     motions: Sequence[PeriodicOrbit] = (),
     max_curves: int = 64,
     max_slices: int = 64,
+    workers: int | None = 1,
     **options: Unpack[SearchOptions],
 ) -> RegimeMap:
     """Which stable motions exist, by their periods, over the plane of omega and a design parameter.
@@ -100,6 +111,9 @@ def regime_map(
         Motions that are known from elsewhere, as from `RegimeCheck.unknown`: the branches that they lie on are mapped.
     max_curves, max_slices
         Curves, and values of the parameter, after which no more are followed.
+    workers
+        Processes (None: one for each core) among which the branches at values of the parameter, and the search among
+        resonances, are divided; curves over the parameter are followed in this one. The result is the same bits.
 
     Returns
     -------
@@ -117,14 +131,18 @@ def regime_map(
     followed = _checked_isolas(isolas, parameter)
     orders, fine, given = checked_orders(search, 1), check_seeds(seeds), _checked_motions(motions, catalogue)
     places = [catalogue.bounds[0] + (i + 0.5) / values * catalogue.span for i in range(values)]
-    plan = _Survey(catalogue, 2**depth, resolution, max_slices)
+    processes = check_workers(workers)
+    plan = _Survey(catalogue, 2**depth, resolution, max_slices, processes)
     kept = "the map holds what had been found by then"
     with catalogue.reporting(options.get("progress"), f"regimes over omega and {parameter}", kept):
         for curve in followed:
             catalogue.add(curve)
         _follow_motions(given, catalogue)
-        for value, order in product(places, orders):
-            for branch in catalogue.resonant(value, order, fine, []):
+        looks = list(product(places, orders))
+        found = _Resonant(catalogue.emptied(), fine).over(looks, processes, catalogue)
+        for value, order in looks:
+            catalogue.progress(0.0, f"searching {period_name(order)} motions at {parameter} = {value:.6g}")
+            for branch in next(found):
                 _follow_curves_of(branch, value, catalogue)
         plan.fill(places)
     with unlimited():
@@ -172,6 +190,48 @@ def _follow_motions(motions: Sequence[PeriodicOrbit], catalogue: Catalogue) -> N
 
 
 # --------------------------------------------------------------------------------------------------------- slices
+@dataclass(frozen=True, eq=False)
+class _Resonant(AtValues):
+    """Branches of a period that a search among resonances meets, by value and period."""
+
+    seeds: Seeds | None
+
+    def found(self, catalogue: Catalogue, place: tuple[float, int]) -> list[Branch]:
+        """See the class."""
+        return catalogue.resonant(*place, self.seeds, [])
+
+
+@dataclass(frozen=True, eq=False)
+class _Diagrams(AtValues):
+    """The response from both ends with all that bifurcates from it, by value and range of omega."""
+
+    longest: int
+
+    def found(self, catalogue: Catalogue, place: tuple[float, SearchRange]) -> list[BifurcationDiagram]:
+        """See the class."""
+        return list(catalogue.responses(*place, Followed(longest=self.longest)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Foreseen:
+    """What the response leads to at a value, if it is followed in the range `reach`, and what could not be settled."""
+
+    reach: SearchRange
+    diagrams: Sequence[BifurcationDiagram]
+    notes: Sequence[str]
+
+
+def _foresee(catalogue: Catalogue, longest: int, place: tuple[float, SearchRange]) -> _Foreseen:
+    diagrams, notes = _Diagrams(catalogue.emptied(), longest)(place)
+    return _Foreseen(place[1], diagrams, notes)
+
+
+def _reach(catalogue: Catalogue, value: float) -> SearchRange:
+    """In which range of omega responses are followed at a value: what leads into the range from beside it is in it."""
+    places = (piece for piece in catalogue.pieces if piece.kind in ("PD", "BP") and piece.contains(value))
+    return catalogue.omega.holding(float(piece.across(value)) for piece in places)
+
+
 @dataclass(eq=False, kw_only=True)
 class _GrowingSlice(Slice):
     """All branches at one value of the design parameter, up to a period, followed as curves become known.
@@ -192,20 +252,24 @@ class _GrowingSlice(Slice):
     reach: SearchRange | None = None
     explained: list[MonotonePiece] = field(default_factory=list)
 
-    def complete(self) -> None:
+    def complete(self, foreseen: _Foreseen | None = None) -> None:
         """Follow the branches; bifurcations met are followed over the parameter if they are new.
+
+        `foreseen`: what the response leads to there, which holds if it was followed in the range that is needed.
 
         Called again it adds branches through limit points that have become known since, and begins anew where
         bifurcations beyond the range have, from which branches lead into it.
         """
-        places = (p for p in self.catalogue.pieces if p.kind in ("PD", "BP") and p.contains(self.value))
-        reach = self.catalogue.omega.holding(float(piece.across(self.value)) for piece in places)
+        reach = _reach(self.catalogue, self.value)
         before = len(self.branches)
         if self.reach is None or reach.low < self.reach.low or reach.high > self.reach.high:
             self.reach, before = reach, -1
             self.branches, self.arcs, self.explained = [], [], []
             # the response from both ends with all that bifurcates from it
-            for diagram in self.catalogue.responses(self.value, reach, Followed(longest=self.longest)):
+            if foreseen is None or foreseen.reach != reach:
+                foreseen = _foresee(self.catalogue, self.longest, (self.value, reach))
+            self.catalogue.take(foreseen.notes)
+            for diagram in foreseen.diagrams:
                 known = [branch for branch, _ in self.branches]
                 for branch in diagram.branches:
                     if len(branch) and not any(same_branch(branch, other) for other in known):
@@ -372,6 +436,7 @@ class _Survey:
     longest: int
     resolution: float
     most: int
+    workers: int = 1
     slices: list[_GrowingSlice] = field(default_factory=list)
 
     def fill(self, values: Sequence[float]) -> None:
@@ -380,6 +445,7 @@ class _Survey:
         for value in dict.fromkeys((values[0], values[-1])):
             _follow_curves_beside(value, catalogue)
         while waiting:
+            foreseen = self._foreseen(waiting)
             for number, value in enumerate(waiting):
                 if len(self.slices) >= self.most:
                     catalogue.note(
@@ -389,7 +455,7 @@ class _Survey:
                 share = len(self.slices) / (len(self.slices) + len(waiting) - number + 3.0)
                 catalogue.progress(share, f"{catalogue.name} = {value:.6g}")
                 new = _GrowingSlice(value, catalogue=catalogue, longest=self.longest)
-                new.complete()
+                new.complete(next(foreseen))
                 self.slices.append(new)
             # limit points that have become known later may lie on branches that were not met before
             count = -1
@@ -399,6 +465,18 @@ class _Survey:
                     known.complete()
             empty = [0.5 * (a + b) for a, b, within in self._strips(self.resolution) if not within]
             waiting = empty or self._doubtful()
+
+    def _foreseen(self, values: Sequence[float]) -> Iterator[_Foreseen | None]:
+        """What the response leads to at each value in the range that is known to be needed by now; None for one
+        process, which may wait until all is known that was met before.
+        """
+        if self.workers == 1:
+            yield from repeat(None, len(values))
+        else:
+            places = [(value, _reach(self.catalogue, value)) for value in values]
+            found = in_order(_Diagrams(self.catalogue.emptied(), self.longest), places, self.workers)
+            for (_, reach), (diagrams, notes) in zip(places, found, strict=True):
+                yield _Foreseen(reach, diagrams, notes)
 
     def critical(self) -> list[float]:
         """Values of the parameter, ascending, bounds included, at which the order of the regimes may change.

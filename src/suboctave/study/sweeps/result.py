@@ -1,0 +1,176 @@
+"""What a sweep gives: one labelled dataset over its parameters, its tables and its files."""
+
+from __future__ import annotations
+
+import json
+import textwrap
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from suboctave.errors import InputError, suggest
+from suboctave.harmonic.linear_part import LinearPart
+from suboctave.interruption import Interruption
+from suboctave.store.layout import parameter_column
+from suboctave.store.registry import Codec, Datasets, Stored, register
+from suboctave.store.table import Table, write_csv
+from suboctave.study.sweeps.quantities import Row
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+#: names of a dataset that no parameter can have
+OWN = ("failure", "seconds", "point", "event", "isola", "row")
+#: what `failure` says of a point that has not been computed
+MISSING = "not computed"
+#: different failures that are printed
+_SHOWN = 5
+
+
+@dataclass(frozen=True)
+class Computed:
+    """What came of one point: its quantities, in words what failed (empty: nothing), the seconds that it took."""
+
+    row: Row
+    failure: str = ""
+    seconds: float = float("nan")
+
+
+@dataclass(eq=False, repr=False)
+class Sweep(Stored):
+    """A study at many values of its parameters.
+
+    Attributes
+    ----------
+    dataset
+        All of it (`to_xarray`): a grid has its parameters as dimensions, a list and draws have the dimension `point`,
+        with the parameters as coordinates. A quantity is named after its analysis, "response.peak_amplitude"; lists of
+        the first bifurcations, isolas or rows lie along `event`, `isola` or `row`, nan behind the last. `failure` says
+        what failed at a point, empty where nothing did; `seconds` how long it took.
+    parameters
+        Names of the parameters.
+    title
+        That of the study.
+    interruption
+        What stopped it, Ctrl-C or a time limit; None if all points are computed.
+    """
+
+    dataset: xarray.Dataset
+    parameters: tuple[str, ...]
+    title: str = ""
+    interruption: Interruption | None = None
+
+    def __len__(self) -> int:
+        return int(self.dataset["failure"].size)
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """The names of what is known of every point."""
+        return tuple(str(name) for name in self.dataset.data_vars if name not in ("failure", "seconds"))
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """The values of a quantity or a parameter, in the shape of the dataset's variable."""
+        known = {parameter_column(p, OWN): p for p in self.parameters}
+        column = parameter_column(name, OWN) if name in self.parameters else name
+        if column not in self.dataset.variables:
+            raise InputError(f"the sweep has no quantity {name!r}{suggest(name, [*self.quantities, *known.values()])}")
+        return self.dataset[column].to_numpy()
+
+    @property
+    def failures(self) -> dict[int, str]:
+        """In words what failed, by the number of the point (in the order of the dataset)."""
+        texts = self.dataset["failure"].to_numpy().ravel()
+        return {number: str(text) for number, text in enumerate(texts) if text}
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The dataset."""
+        return self.dataset
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """One row per point: parameters, quantities, lists as one column for each place ("response.LP.omega[0]")."""
+        import pandas
+
+        dataset = self.dataset
+        over = dataset["failure"].dims
+        columns: dict[str, Any] = {}
+        for name in (*(parameter_column(p, OWN) for p in self.parameters), *self.quantities, "failure", "seconds"):
+            lists = [dim for dim in dataset[name].dims if dim not in over]
+            values = dataset[name].broadcast_like(dataset["failure"]).transpose(*over, *lists).to_numpy()
+            if lists:
+                flat = values.reshape(len(self), -1)
+                columns |= {f"{name}[{place}]": flat[:, place] for place in range(flat.shape[1])}
+            else:
+                columns[name] = values.ravel()
+        return pandas.DataFrame(columns)
+
+    def to_table(self) -> Table:
+        """The same as a table."""
+        frame = self.to_dataframe()
+        return Table({str(name): frame[name].to_numpy() for name in frame.columns}, self.words)
+
+    def to_csv(self, path: str | Path, overwrite: bool = False) -> Path:
+        """The same as comma-separated text (.csv), all digits kept."""
+        return write_csv(self.to_dataframe(), path, overwrite)
+
+    def summary(self) -> Table:
+        """One row for each quantity without a list: least, median and largest value, and how many points have none."""
+        rows = []
+        for name in self.quantities:
+            if self.dataset[name].dims == self.dataset["failure"].dims:
+                values = self[name].ravel()
+                there = values[~np.isnan(values)]
+                three = np.quantile(there, (0.0, 0.5, 1.0)).tolist() if there.size else [float("nan")] * 3
+                rows.append([name, *three, int(values.size - there.size)])
+        return Table.of_rows(("quantity", "least", "median", "largest", "missing"), rows, self.words)
+
+    @property
+    def words(self) -> str:
+        """How many points over what, and how many failed."""
+        failed = sum(text != MISSING for text in self.failures.values())
+        missing = len(self.failures) - failed
+        text = f"{len(self)} points over {', '.join(self.parameters)}, {failed} with a failure"
+        return text + (f", {missing} not computed" if missing else "")
+
+    def __repr__(self) -> str:
+        return "\n".join([f"Sweep: {self.words}", *self.failure_lines()])
+
+    def failure_lines(self) -> list[str]:
+        """The different failures, the most frequent first, each with how many points have it and the first of them."""
+        points: dict[str, list[int]] = {}
+        for number, text in self.failures.items():
+            points.setdefault(text, []).append(number)
+        points.pop(MISSING, None)
+        lines = []
+        for text, numbers in sorted(points.items(), key=lambda item: -len(item[1]))[:_SHOWN]:
+            where = f"point {numbers[0]}" if len(numbers) == 1 else f"{len(numbers)} points, the first {numbers[0]}"
+            lines.append(f"{where}: {textwrap.shorten(text, 300)}")
+        return [*lines, f"and {len(points) - _SHOWN} other failures"] if len(points) > _SHOWN else lines
+
+
+# ------------------------------------------------------------------------------------------------------------- files
+def _written(sweep: Sweep) -> dict[str, xarray.Dataset]:
+    stopped = "" if sweep.interruption is None else json.dumps(sweep.interruption.seconds)
+    attributes = {"parameters": "\n".join(sweep.parameters), "stopped": stopped, "seconds": float(sweep.seconds)}
+    return {"": sweep.dataset.assign_attrs(attributes)}
+
+
+def _read(groups: Datasets, allow_code: bool, linear: LinearPart | None) -> Sweep:
+    dataset = groups[""]
+    attributes = dict(dataset.attrs)
+    names: Sequence[str] = str(attributes["parameters"]).splitlines()
+    stopped = str(attributes["stopped"])
+    kept = {name: attributes[name] for name in ("title", "study", "listed", "key", "origin") if name in attributes}
+    whole = dataset.assign(failure=(dataset["failure"].dims, dataset["failure"].to_numpy().astype(object)))
+    whole["failure"].attrs = dict(dataset["failure"].attrs)
+    whole.attrs = kept
+    interruption = Interruption(json.loads(stopped)) if stopped else None
+    sweep = Sweep(whole, tuple(names), str(attributes.get("title", "")), interruption)
+    sweep.seconds = float(attributes["seconds"])
+    return sweep
+
+
+register(Codec("sweep", Sweep, _written, _read))
