@@ -64,6 +64,7 @@ ELSEWHERE = {
     "self_excited.md": "study/test_undriven_steps.py",
     "sensitivity.md": "maps/test_sensitivity_page.py",
     "structures.md": "structures/test_page.py",
+    "sweeps.md": "study/test_sweeps.py",
     "tutorial.md": "study/test_tutorial.py",
 }
 #: shows the verbs side by side, a minute of them: each is in a page that runs
