@@ -124,7 +124,7 @@ def test_a_bifurcation_point_stays_undecided_and_says_why(doubling):
 def test_roots_beside_multipliers_are_those_of_shooting(random_motions):
     """Whatever the monodromy matrix leaves open: the root beside it is within its own estimate of the truth."""
     asked, answered = 0, 0
-    for drawn in random_motions(3, 40):
+    for drawn in random_motions(3, 10):
         state = drawn.orbit.state()
         known = floquet_multipliers(state)
         found = hill_beside(state, replace(known, errors=np.full(known.errors.shape, 10.0)))

@@ -25,6 +25,7 @@ def digests(item):
     return found
 
 
+@pytest.mark.slow
 def test_isolas_on_two_processes_are_those_of_one():
     one, two = (so.find_isolas(SYSTEM, **SEARCH, levels=(1.5,), workers=workers) for workers in (1, 2))
     assert len(one) == 1

@@ -91,6 +91,7 @@ def test_the_number_of_workers_changes_no_bit_and_a_measure_adds_its_own(study, 
     assert alone["first"][1, 0] == pytest.approx(2 * alone["first"][0, 0], rel=1e-2)  # far above resonance it is linear
 
 
+@pytest.mark.slow
 def test_isolas_diagrams_and_tables_have_quantities_too(tmp_path):
     path = tmp_path / "study.toml"
     path.write_text(
@@ -221,6 +222,7 @@ def stopping_at(count):
     return report
 
 
+@pytest.mark.slow
 def test_ctrl_c_leaves_what_is_computed_and_something_to_go_on_with(study, grid, tmp_path):
     path = tmp_path / "sweep.nc"
     part = so.sweep(study, GRID, path=path, workers=2, progress=stopping_at(5))

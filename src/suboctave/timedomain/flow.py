@@ -10,7 +10,6 @@ verbs are in `analysis`.
 
 from __future__ import annotations
 
-import os
 import threading
 from collections.abc import Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
@@ -31,6 +30,7 @@ from suboctave.timedomain.batch import Batch, Group, Method
 from suboctave.timedomain.law_code import PythonCallbacks
 from suboctave.timedomain.layout import Layout
 from suboctave.timedomain.newmark import NewmarkMethod
+from suboctave.workers import processors
 
 __all__ = ["METHODS", "Flow", "Motions", "check_extent"]
 
@@ -282,7 +282,7 @@ class _Run:
 
     def go(self, workers: int | None, report: Report | None) -> Motions:
         """Follow all of them."""
-        many = min(_processors() if workers is None else check_count("workers", workers), len(self.groups))
+        many = min(processors() if workers is None else check_count("workers", workers), len(self.groups))
         interruption: Interruption | None = None
         try:
             if many <= 1:
@@ -342,10 +342,6 @@ class _Run:
         for name, values in (samples | method.results(group)).items():
             getattr(self.motions, name)[members.start : members.stop] = values[: len(members)]
         self.motions.finished[members.start : members.stop] = True
-
-
-def _processors() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _floats(name: str, given: ArrayLike) -> Array:
