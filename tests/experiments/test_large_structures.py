@@ -182,6 +182,7 @@ def test_the_fundamental_of_a_stepped_sine_is_that_of_harmonic_balance(spring):
         assert abs(test.harmonic(1, dof)[0]) == pytest.approx(abs(orbit.harmonic(1, dof)), rel=1e-2)
 
 
+@pytest.mark.slow
 def test_basins_of_two_motions_of_a_structure(spring, curve, tmp_path):
     """Both stable motions at one frequency, on the plane of the tip: the states nearest to them belong to them."""
     low, high = sorted(b.omega for b in curve.bifurcations["LP"])

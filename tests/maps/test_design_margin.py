@@ -35,6 +35,7 @@ def test_ends_move_as_ends_that_are_located_anew(isola, end):
             assert rates[free] == pytest.approx(difference, rel=1e-6, abs=1e-7 * abs(rates["j"]) + 1e-8)
 
 
+@pytest.mark.slow
 def test_the_isola_is_gone_just_beyond_its_margin_and_there_before_it(isola):
     margin = so.design_margin(isola, ["zeta", "p"])
     assert margin.end.parameter("j") == pytest.approx(0.5, abs=1e-9)

@@ -55,6 +55,7 @@ def test_few_modes_stand_for_many_degrees_of_freedom(projected):
     assert "200 degrees of freedom" in repr(linear)
 
 
+@pytest.mark.slow
 def test_the_same_events(projected, whole):
     assert len(whole.bifurcations) >= 2
     assert [b.kind for b in projected.bifurcations] == [b.kind for b in whole.bifurcations]

@@ -12,6 +12,7 @@ SYSTEM = '[system]\nlibrary = "reference_oscillator"\narguments = { p = 0.55, j 
 STUDY = SYSTEM + ANALYSES.replace("bounds = [0.0, 1.0]", "bounds = [0.0, 1.0]\nvalues = 2\nharmonics = 15")
 
 
+@pytest.mark.slow
 def test_the_study_of_the_page_gives_what_a_script_gives(study_file, suboctave):
     file = study_file(STUDY)
     status, out, err = suboctave("run", file)

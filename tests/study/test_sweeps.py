@@ -291,6 +291,7 @@ def killed(study, path, points, delay):
 
 
 @POSIX
+@pytest.mark.slow
 def test_a_killed_sweep_goes_on(study, grid, tmp_path):
     path = tmp_path / "sweep.nc"
     killed(study, path, 1, 0.0)
