@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from slow import slow
 
 import suboctave as so
 from suboctave.errors import InputError
@@ -121,10 +122,11 @@ def test_a_bifurcation_point_stays_undecided_and_says_why(doubling):
     assert [w.method for w in found.witnesses] == ["monodromy", "Hill"]
 
 
-def test_roots_beside_multipliers_are_those_of_shooting(random_motions):
+@pytest.mark.parametrize("count", [10, *slow(40)])
+def test_roots_beside_multipliers_are_those_of_shooting(random_motions, count):
     """Whatever the monodromy matrix leaves open: the root beside it is within its own estimate of the truth."""
     asked, answered = 0, 0
-    for drawn in random_motions(3, 10):
+    for drawn in random_motions(3, count):
         state = drawn.orbit.state()
         known = floquet_multipliers(state)
         found = hill_beside(state, replace(known, errors=np.full(known.errors.shape, 10.0)))

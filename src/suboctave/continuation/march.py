@@ -38,6 +38,8 @@ _BEYOND, _AT_ONCE, _CLOSE = (1e-6, 1e-5, 1e-4, 1e-3), 1e-5, 100.0
 _CLOSELY, _LEFT = 1e-4, 1e-2
 #: share of a step over which derivatives count as the same
 _SPARED = 2e-4
+#: squared sine of the angle between the tangents of two neighbours below which no corner is looked for between them
+_STRAIGHT = 0.01
 #: angle between successive tangents at which a step is refused, radians, unless the aim is large
 _SHARP = 0.75
 
@@ -121,10 +123,6 @@ class Place:
             if miss < 0.05 * step + 1e-6:
                 return replace(own, arclength=point.arclength + length(from_point))
         return None
-
-
-#: squared sine of the angle between tangents below which a curve bends, or bends back, without a corner
-_STRAIGHT = 0.01
 
 
 @dataclass(frozen=True)
@@ -369,7 +367,11 @@ class March:
 
 
 def _leaving(point: CurvePoint, new: CurvePoint) -> CurvePoint:
-    """A point behind a corner, headed away from where its tangent meets that of the last point before the corner."""
+    """The second of two neighbours; behind a corner headed away from it.
+
+    The corner lies where the tangents meet: `new - point = d a + s b` with unit tangents a and b. Where s is negative
+    the corner lies ahead of the second one as it is headed, and it is turned.
+    """
     a, b, way = (new.weights * vector for vector in (point.tangent, new.tangent, new.u - point.u))
     a, b = a / length(a), b / length(b)
     cosine_between = float(a @ b)

@@ -16,6 +16,8 @@ import numpy as np
 
 #: degrees of freedom up to which masses are drawn, and matrices written out
 _DRAWN, _WRITTEN = 8, 6
+#: elements and loads that are listed
+_LISTED = 12
 #: entry of a matrix, in units of its largest, below which nothing is coupled
 _NOTHING = 1e-12
 #: pixels: distance of masses and of connections, size of a mass, and where the row of masses begins
@@ -171,10 +173,6 @@ def system_html(system: Any) -> str:
         listed=_LISTED,
     )
     return text
-
-
-#: elements and loads that are listed
-_LISTED = 12
 
 
 def _cells(matrix: Any) -> list[list[str]]:

@@ -111,8 +111,7 @@ def sweep(
         if place is not None:
             for torn in place.parent.glob(f".{place.name}-*.part"):  # half a file of a sweep that was killed
                 torn.unlink(missing_ok=True)
-            place.unlink(missing_ok=True)
-            result.save(place)
+            result.save(place, overwrite=True)
             if interruption is None:
                 kept.remove()
     return result
