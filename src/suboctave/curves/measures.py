@@ -13,12 +13,7 @@ from suboctave.continuation.problem import Curve
 from suboctave.curves.motion import MotionEvaluation, MotionProblem
 from suboctave.harmonic.energy import mean_energy
 from suboctave.harmonic.evaluation import BalanceState
-from suboctave.harmonic.orbit import PeriodicOrbit
-
-
-def amplitude(state: BalanceState, observe: int) -> float:
-    """Largest |x| of a degree of freedom."""
-    return PeriodicOrbit(state.balance, state.x, state.omega, state.values, 0.0).amplitude(observe)
+from suboctave.harmonic.orbit import amplitude_along
 
 
 def energy(state: BalanceState, observe: int) -> float:
@@ -27,7 +22,7 @@ def energy(state: BalanceState, observe: int) -> float:
 
 
 #: by the name of what is bounded
-MEASURES: dict[str, Callable[[BalanceState, int], float]] = {"amplitude": amplitude, "energy": energy}
+MEASURES: dict[str, Callable[[BalanceState, int], float]] = {"amplitude": amplitude_along, "energy": energy}
 
 
 def _at(name: str, observe: int, point: CurvePoint) -> float:

@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
+from suboctave.compiled import kernel
 from suboctave.errors import ConvergenceError, InputError, shortened
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.linear_part import (
@@ -34,6 +35,7 @@ from suboctave.harmonic.linear_part import (
     damping_words,
     differentiated,
     entries_at,
+    factors,
     fed_matrices,
     feeding_matrices,
     in_words,
@@ -110,6 +112,37 @@ class Stack(NamedTuple):
             values[:, b:c].reshape(count, s, m),
             inner,
         )
+
+    def between(self, frequency: NDArray[Any], order: int, left: ComplexArray, right: ComplexArray) -> ComplexArray:
+        """`[1 -left^T] Z [1; -right]` of that, (F, m, m); left, right (F, s, m)."""
+        out = np.empty((len(frequency), self.sizes[0], self.sizes[0]), dtype=complex)
+        between(self.entries, self.diagonal, frequency.astype(complex), order, left, right, out)
+        return out
+
+
+@kernel(fastmath={"contract"})
+def between(entries, diagonal, frequency, order, left, right, out):
+    """See `Stack`, `Stack.between`."""
+    s, m = right.shape[1:]
+    across, back, inner = m * m, m * m + m * s, m * m + 2 * m * s
+    z, moved = np.empty(entries.shape[1], dtype=np.complex128), np.empty(m, dtype=np.complex128)
+    for f in range(frequency.shape[0]):
+        by = factors(frequency[f], order)
+        for i in range(len(z)):
+            z[i] = by[0] * entries[0, i] + by[1] * entries[1, i] + by[2] * entries[2, i] + by[3] * entries[3, i]
+        for i in range(m):
+            for j in range(m):
+                out[f, i, j] = z[i * m + j]
+        for k in range(s):
+            for j in range(m):
+                moved[j] = z[back + k * m + j]
+            for l in range(k if diagonal else 0, k + 1 if diagonal else s):
+                own = z[inner + k] if diagonal else z[inner + k * s + l]
+                for j in range(m):
+                    moved[j] -= own * right[f, l, j]
+            for i in range(m):
+                for j in range(m):
+                    out[f, i, j] -= z[across + i * s + k] * right[f, k, j] + left[f, k, i] * moved[j]
 
 
 def _transposed(matrices: ComplexArray) -> ComplexArray:
@@ -240,12 +273,12 @@ class Condensed:
         return Stack.of([mass, damping, stiffness, structural])
 
     # ------------------------------------------------------------------------------------------------------- blocks
-    def _blocks(self, frequency: NDArray[Any], names: tuple[str, ...] = (), order: int = 0) -> Blocks | None:
-        """Z in the coordinates (q, z), differentiated; None for zero."""
+    def _stack(self, names: tuple[str, ...]) -> Stack | None:
+        """M, C, K, S in the coordinates (q, z), differentiated; None for zero."""
         if not names:
-            return self._own.at(frequency, order)
+            return self._own
         parts = differentiated(self.projected.matrices, names, self.values)
-        return None if parts is None else Stack.of(self._split(parts)).at(frequency, order)
+        return None if parts is None else Stack.of(self._split(parts))
 
     def _eliminated(self, frequency: NDArray[Any]) -> tuple[Blocks, ComplexArray, ComplexArray]:
         """Z at frequencies, `Z_zz^-1 Z_zq`, and the transpose of `Z_qz Z_zz^-1`; what was asked for last is kept."""
@@ -254,7 +287,7 @@ class Condensed:
             left = right = whole.solved(whole.zq)
             if not self._symmetric:
                 turned = whole.transposed()
-                left = turned.solved(turned.zq)
+                left = np.ascontiguousarray(turned.solved(turned.zq))
             self._last = frequency, (whole, right, left)
         return self._last[1]
 
@@ -264,22 +297,32 @@ class Condensed:
         """A, differentiated by at most two things: each some names, or none and an order in Omega of one."""
         whole, right, left = self._eliminated(frequency)
         if not by:
-            result: ComplexArray = whole.qq - whole.qz @ right
-            return result
-        names = tuple(name for one, _ in by for name in one)
-        total = self._blocks(frequency, names, sum(order for _, order in by))
-        result = np.zeros_like(whole.qq) if total is None else total.qq - total.qz @ right
+            return np.ascontiguousarray(whole.qq - whole.qz @ right)
+        total = self._stack(tuple(name for one, _ in by for name in one))
+        result = None
         if total is not None:
-            result += _transposed(left) @ (total.inner(right) - total.zq)
-        if len(by) == 1:
-            return None if total is None else result
-        changes = [blocks for one in by if (blocks := self._blocks(frequency, *one)) is not None]
-        if len(changes) == 2:
-            (left_a, right_a), (left_b, right_b) = (
-                (one.transposed().zq - one.transposed().inner(left), one.zq - one.inner(right)) for one in changes
-            )
-            result -= _transposed(left_a) @ whole.solved(right_b) + _transposed(left_b) @ whole.solved(right_a)
-        return result
+            result = total.between(frequency, sum(order for _, order in by), left, right)
+        if len(by) < 2:
+            return result
+        sides = {one: self._sides(frequency, *one) for one in by}
+        a, b = (sides[one] for one in by)
+        if a is None or b is None:
+            return result
+        moved: ComplexArray = _transposed(a[0]) @ whole.solved(b[1])
+        moved += moved if a is b else _transposed(b[0]) @ whole.solved(a[1])
+        return -moved if result is None else result - moved
+
+    def _sides(
+        self, frequency: NDArray[Any], names: tuple[str, ...], order: int
+    ) -> tuple[ComplexArray, ComplexArray] | None:
+        """`(Z_qz - left^T Z_zz)^T` and `Z_zq - Z_zz right` of Z differentiated; None for zero."""
+        _, right, left = self._eliminated(frequency)
+        stack = self._stack(names)
+        if stack is None:
+            return None
+        change = stack.at(frequency, order)
+        turned = change.transposed()
+        return turned.zq - turned.inner(left), change.zq - change.inner(right)
 
     @lazy
     def _symmetric(self) -> bool:
@@ -298,22 +341,19 @@ class Condensed:
     def feeding(self, frequency: Array) -> ComplexArray:
         """See `LinearPart.feeding`."""
         _, right, left = self._eliminated(frequency)
-        total = self._own._replace(entries=feeding_matrices(self._own.entries)).at(frequency, 0)
-        result: ComplexArray = total.qq - total.qz @ right + _transposed(left) @ (total.inner(right) - total.zq)
-        return np.ascontiguousarray(result)
+        return self._own._replace(entries=feeding_matrices(self._own.entries)).between(frequency, 0, left, right)
 
     # ----------------------------------------------------------------------------------------------------- contract
     def stiffness(self, frequency: NDArray[Any], order: int = 0) -> ComplexArray:
         """See `LinearPart.stiffness`."""
         result = self._differentiated(frequency, (((), 1),) * order)
         assert result is not None
-        return np.ascontiguousarray(result)
+        return result
 
     def stiffness_by(self, frequency: Array, names: tuple[str, ...], order: int = 0) -> ComplexArray | None:
         """See `LinearPart.stiffness_by`."""
         by = (*(((name,), 0) for name in names), *(((), 1),) * order)
-        result = self._differentiated(frequency, by)
-        return None if result is None else np.ascontiguousarray(result)
+        return self._differentiated(frequency, by)
 
     def retain(self, direction: Array) -> Array:
         """See `LinearPart.retain`."""

@@ -19,7 +19,7 @@ import numpy as np
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.aft.law import Member
 from suboctave.harmonic.assembly import apply_blocks
-from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis, to_complex
+from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.evaluation import BalanceState, HarmonicBalance, length
 from suboctave.model.elements.coupled import as_coupled
 from suboctave.model.elements.smoothness import levels
@@ -62,17 +62,12 @@ def fed(state: BalanceState, zeta: float) -> BalanceState:
     return BalanceState(state.balance, linear, state.x, state.omega, state.values)
 
 
-def _recovered(state: BalanceState) -> ComplexArray:
-    """Complex amplitudes in the linear part's equation of motion, (H + 1, N)."""
-    return state.linear.recovered(state.frequencies, to_complex(state.x))
-
-
 def action(state: BalanceState) -> float:
     """`1 / (2 pi)` times the integral of `p . x'` over the period of the motion, `p = M x' + G x / 2` with G the
     gyroscopic part of the damping matrix.
     """
     mass, damping, _ = state.linear.equation_of_motion()
-    moving = _recovered(state)
+    moving = state.recovered
     velocity = 1j * state.frequencies[:, None] * moving
     momentum = velocity @ mass.T + 0.25 * moving @ (damping - damping.T).T
     return 0.5 * float(np.vdot(velocity, momentum).real) / state.rate
@@ -80,13 +75,13 @@ def action(state: BalanceState) -> float:
 
 def twice_kinetic(state: BalanceState) -> float:
     """The mean of `x' . M x'`, twice the kinetic energy."""
-    mass, velocity = state.linear.equation_of_motion()[0], 1j * state.frequencies[:, None] * _recovered(state)
+    mass, velocity = state.linear.equation_of_motion()[0], 1j * state.frequencies[:, None] * state.recovered
     return 0.5 * float(np.vdot(velocity, velocity @ mass.T).real)
 
 
 def modal_amplitude(state: BalanceState) -> float:
     """`sqrt(c . M c)`, c the complex amplitudes at omega: that of a mode shape with unit modal mass."""
-    mass, c = state.linear.equation_of_motion()[0], _recovered(state)[state.basis.nu]
+    mass, c = state.linear.equation_of_motion()[0], state.recovered[state.basis.nu]
     return math.sqrt(max(float((c.conj() @ mass @ c).real), 0.0))
 
 
@@ -102,10 +97,9 @@ def action_along(state: BalanceState, motion: Array, omega: float) -> float:
     """The change of the action along changes of X, (dimension,), and omega, relative to it, of a conservative motion:
     the action is `-1/4` times the sum of `k c . (dA/dOmega) c` over its harmonics c.
     """
-    k = state.basis.multiples[:, None, None]
-    first, second = (k**order * state.linear.stiffness(state.frequencies, order) for order in (1, 2))
-    held = apply_blocks(first, state.x)
-    change = 2.0 * np.vdot(state.balance.shaped(motion), held) + omega * np.vdot(state.x, apply_blocks(second, state.x))
+    bend = state.basis.multiples[:, None, None] ** 2 * state.linear.stiffness(state.frequencies, 2)
+    held, turned = apply_blocks(state.slope, state.x), apply_blocks(bend, state.x)
+    change = 2.0 * np.vdot(state.balance.shaped(motion), held) + omega * np.vdot(state.x, turned)
     return float(change) / (float(np.vdot(state.x, held)) or 1.0)
 
 
@@ -113,7 +107,7 @@ def mean_energy(state: BalanceState) -> float:
     """The mean of the energy over a period, zero at rest."""
     linear, n = state.linear, state.balance.system.n
     rest = at_rest(state.balance, state.omega, state.values).x[0]
-    moving = _recovered(state)
+    moving = state.recovered
     still = linear.recovered(np.zeros(1), rest[None].astype(complex)).real[0]
     count = 4 * state.basis.harmonics + 4
     tau = 2.0 * np.pi * np.arange(count) / count

@@ -28,7 +28,7 @@ from suboctave.harmonic.assembly import (
     sparse,
     toeplitz,
 )
-from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis, spectrum_to_real
+from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis, spectrum_to_real, to_complex
 from suboctave.harmonic.equations import Equations, Laws
 from suboctave.harmonic.linear_part import LinearPart
 from suboctave.harmonic.quadrature import Nodes
@@ -73,12 +73,15 @@ class HarmonicBalance(Equations):
             If an element returns a force that is not finite.
         """
         used = self.values if values is None else values
+        return BalanceState(self, self.linear_at(omega, used), self.shaped(np.asarray(x, float)), float(omega), used)
+
+    def linear_at(self, omega: float, values: Mapping[str, float]) -> LinearPart:
+        """The linear part at parameter values, for motions at a frequency."""
         basis, linear = self.basis, self.linear
-        if used is not self.values and any(used[n] != self.values[n] for n in self.matrix_names):
-            linear = linear.rebuilt(used)
+        if values is not self.values and any(values[n] != self.values[n] for n in self.matrix_names):
+            linear = linear.rebuilt(values)
         # the half-odd basis goes up to H + 1/2
-        linear = linear.covering((basis.harmonics + 0.5) / basis.nu * abs(float(omega)))
-        return BalanceState(self, linear, self.shaped(np.asarray(x, float)), float(omega), used)
+        return linear.covering((basis.harmonics + 0.5) / basis.nu * abs(float(omega)))
 
     def settle(self, x: Array, omega: float, values: Mapping[str, float] | None = None) -> HarmonicBalance:
         """These equations with sample counts chosen for a motion and frozen from here on."""
@@ -118,9 +121,23 @@ class BalanceState:
         self.rate = omega / balance.basis.nu
         #: circular frequencies of the harmonics, (H + 1,)
         self.frequencies = balance.basis.multiples * omega
-        #: A at the harmonics, (H + 1, size, size)
-        self.blocks = linear.stiffness(self.frequencies)
         self.laws: Laws = balance.laws(values)
+
+    @lazy
+    def blocks(self) -> ComplexArray:
+        """A at the harmonics, (H + 1, size, size)."""
+        return self.linear.stiffness(self.frequencies)
+
+    @lazy
+    def slope(self) -> ComplexArray:
+        """The same differentiated by omega."""
+        slope: ComplexArray = self.basis.multiples[:, None, None] * self.linear.stiffness(self.frequencies, 1)
+        return slope
+
+    @lazy
+    def recovered(self) -> ComplexArray:
+        """Complex amplitudes in the linear part's equation of motion, (H + 1, N)."""
+        return self.linear.recovered(self.frequencies, to_complex(self.x))
 
     @property
     def packed(self) -> PackedLaws:
@@ -324,8 +341,7 @@ class BalanceState:
     def linear_by(self, name: str) -> ComplexArray | None:
         """A at the harmonics differentiated by "omega" or a parameter, (H + 1, size, size); None for zero."""
         if name == "omega":
-            slope: ComplexArray = self.basis.multiples[:, None, None] * self.linear.stiffness(self.frequencies, 1)
-            return slope
+            return self.slope
         return self.linear.stiffness_by(self.frequencies, (name,)) if name in self.balance.matrix_names else None
 
     @property

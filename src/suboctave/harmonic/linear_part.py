@@ -249,15 +249,19 @@ def entries_at(entries: Array, frequency: NDArray[Any], order: int) -> ComplexAr
 
 
 @kernel()
+def factors(w, order):
+    """What M, C, K, S are multiplied by in the dynamic stiffness at w, complex, or in its derivative by Omega."""
+    if order == 0:
+        return -w * w, 1j * w, 1.0 + 0.0j, 1j * np.sign(w.real)
+    return (-2.0 * w, 1j, 0.0j, 0.0j) if order == 1 else (complex(-2.0), 0.0j, 0.0j, 0.0j)
+
+
+@kernel()
 def dynamic_stiffness(entries, frequency, order, out):
     """`K - Omega^2 M + i Omega C + i sgn(Re Omega) S` into `out` (F, .), or its first or second derivative by Omega,
     complex; entries (4, .): M, C, K, S.
     """
     for f in range(frequency.shape[0]):
-        w = frequency[f]
-        inertia = -w * w if order == 0 else -2.0 * w if order == 1 else complex(-2.0)
-        damping, static = w if order == 0 else complex(1.0 if order == 1 else 0.0), 1.0 if order == 0 else 0.0
-        side = static * np.sign(w.real)
+        by = factors(frequency[f], order)
         for i in range(entries.shape[1]):
-            loss = damping * entries[1, i] + side * entries[3, i]
-            out[f, i] = static * entries[2, i] + inertia * entries[0, i] + complex(-loss.imag, loss.real)
+            out[f, i] = by[0] * entries[0, i] + by[1] * entries[1, i] + by[2] * entries[2, i] + by[3] * entries[3, i]

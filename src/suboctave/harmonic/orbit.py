@@ -85,7 +85,7 @@ class PeriodicOrbit:
     @cached_property
     def _linear(self) -> LinearPart:
         """The linear part at the motion's parameters and frequencies."""
-        return self.state().linear
+        return self.balance.linear_at(self.omega, self.values)
 
     @cached_property
     def _moving(self) -> ComplexArray:
@@ -140,15 +140,15 @@ class PeriodicOrbit:
 
     def amplitude(self, dof: int = 0) -> float:
         """Largest |x| of a DOF over the motion's period, found by Newton's method on dx/dt = 0."""
-        return self._peak(self._along(dof))
+        return _peak(self._along(dof))
 
     def velocity_amplitude(self, dof: int = 0) -> float:
         """Largest |dx/dt| of a DOF over the motion's period, as `amplitude`."""
-        return self._peak(self._along(dof, 1))
+        return _peak(self._along(dof, 1))
 
     def acceleration_amplitude(self, dof: int = 0) -> float:
         """Largest second derivative of x of a DOF, in modulus, over the motion's period, as `amplitude`."""
-        return self._peak(self._along(dof, 2))
+        return _peak(self._along(dof, 2))
 
     def rms(self, dof: int = 0, derivative: int = 0) -> float:
         """Root mean square of x over the period, its mean included, or of a derivative by t.
@@ -157,9 +157,6 @@ class PeriodicOrbit:
         """
         c = self._along(dof, derivative)
         return math.sqrt(c[0].real ** 2 + 0.5 * float(np.sum(np.abs(c[1:]) ** 2)))
-
-    def _peak(self, c: ComplexArray) -> float:
-        return peak(np.ascontiguousarray(c), 8 * self.basis.harmonics + 8)[0]
 
     def along(self, direction: Array) -> ComplexArray:
         """Complex amplitudes of `direction . x`, shape (H + 1,); `direction`: (n,), over the structure's DOFs."""
@@ -177,9 +174,7 @@ class PeriodicOrbit:
             raise InputError(
                 f"dof={dof} is out of range: the motion has {n} DOF{'s' if n > 1 else ''}, numbered from 0"
             )
-        unit = np.zeros(n)
-        unit[dof] = 1.0
-        c = self.along(unit)
+        c = self.along(_unit(n, dof))
         return c * (1j * self.basis.multiples * self.omega) ** derivative if derivative else c
 
     def __repr__(self) -> str:
@@ -188,6 +183,22 @@ class PeriodicOrbit:
             f"PeriodicOrbit(omega={self.omega:.8g}, harmonics={self.basis.harmonics}{period}, "
             f"residual={self.residual:.1e}, truncation={self.truncation:.1e})"
         )
+
+
+def _unit(n: int, dof: int) -> Array:
+    unit = np.zeros(n)
+    unit[dof] = 1.0
+    return unit
+
+
+def _peak(c: ComplexArray) -> float:
+    """The largest modulus of a real signal with complex amplitudes c, (H + 1,)."""
+    return peak(np.ascontiguousarray(c), 8 * len(c))[0]
+
+
+def amplitude_along(state: BalanceState, dof: int) -> float:
+    """Largest |x| of a DOF along an evaluated motion, as `PeriodicOrbit.amplitude`."""
+    return _peak(state.recovered @ state.linear.seen(_unit(state.balance.system.n, dof)))
 
 
 def force_along(state: BalanceState, element: int) -> Callable[[Array], Array]:
