@@ -7,8 +7,8 @@
 Columns: degrees of freedom, what holds it, seconds until the linear part is ready (assembly and compiling left out),
 the highest memory of the process in GB, modes of the projection, error of its flexibility at (H + 1/2) omega_max
 against a direct solution of the whole structure, points of a response with stability and events, milliseconds for each
-point, and how many events were located. Fifteen harmonics, one thread of linear algebra. Ratios within one run count:
-the first line is one mass.
+point (of the processor, the best of three runs), and how many events were located. Fifteen harmonics, one thread of
+linear algebra. Ratios within one run count: the first line is one mass.
 """
 
 from __future__ import annotations
@@ -59,9 +59,9 @@ def measured(family: str, n: int, kind: str, tracks: bool) -> str:
     ready = time.perf_counter() - start
     best = np.inf
     for _ in range(3):
-        start = time.perf_counter()
+        start = time.process_time()
         branch = so.frequency_response(system, omega, harmonics=HARMONICS, linear=linear)
-        best = min(best, time.perf_counter() - start)
+        best = min(best, time.process_time() - start)
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
     modes, error = len(linear.equation_of_motion()[0]), getattr(linear, "error", 0.0)
     line = (
