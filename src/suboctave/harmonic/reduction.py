@@ -142,63 +142,65 @@ class Reduction:
     def _grown_to(self, frequency: float, values: Mapping[str, float], at: Array) -> Reduction:
         larger = copy.copy(self)
         larger._larger = weakref.WeakValueDictionary()
-        larger._grown(frequency, values)
+        known_to = max((covers for tested, covers in self._tested if np.array_equal(tested, at)), default=-1.0)
+        larger._grown(frequency, values, known_to)
         larger._tested = [*self._tested, (at, frequency)]
         larger.projected = larger._project(values)
         return larger
 
     # ---------------------------------------------------------------------------------------------------- the basis
-    def _grown(self, top: float, values: Mapping[str, float]) -> None:
-        """Grow the basis until it serves."""
-        matrices = [matrix.sparse_value(values) for matrix in self._matrices]
+    def _grown(self, top: float, values: Mapping[str, float], known_to: float) -> None:
+        """Grow the basis until it serves up to `top`; up to `known_to` it does."""
+        images = _Images([matrix.sparse_value(values) for matrix in self._matrices], self._shapes)
         if self._solve is None:
-            self._solve = factorised(matrices[2] + self.scale**2 * matrices[0]).solve
-        images = [matrix @ self._shapes for matrix in matrices]
+            self._solve = factorised(images.matrices[2] + self.scale**2 * images.matrices[0]).solve
         columns = self.served.T
         if not self._shapes.shape[1]:
-            self._add(self._solve(np.ascontiguousarray(columns)), matrices, images)
+            self._add(self._solve(np.ascontiguousarray(columns)), images)
         best, since = math.inf, 0
-        order, known = list(range(len(_TESTED))), np.zeros((1, 1, 1), dtype=complex)
+        order, known = [share for share in _TESTED if share * top > known_to], np.zeros((1, 1, 1), dtype=complex)
         while True:
             check_time()
-            small = [self._shapes.T @ image for image in images]
             worst, left = 0.0, []
-            for i in order.copy():
-                error, answers = self._left_over(_TESTED[i] * top, small, images)
+            for share in order.copy():
+                error, answers = self._left_over(share * top, images)
                 if error > worst:
                     # the next basis is tested there first
                     worst = error
-                    order.remove(i)
-                    order.insert(0, i)
+                    order.remove(share)
+                    order.insert(0, share)
                 left.append(answers)
                 if worst > _TOLERANCE and len(left) >= _AT_ONCE:
                     break
             best, since = (worst, 0) if worst < 0.5 * best or worst > _PROMISING else (best, since + 1)
-            known, last = _flexibilities(small, self._shapes.T @ columns, top), known
+            known, last = _flexibilities(images.small, self._shapes.T @ columns, top), known
             settled = (worst <= _TOLERANCE or since >= _PATIENCE) and _change(last, known) <= max(_SETTLED, 3.0 * worst)
             if settled or self._shapes.shape[1] >= min(_MOST, self.system.n):
                 return
-            self._add(np.concatenate(left, axis=1), matrices, images)
+            self._add(np.concatenate(left, axis=1), images)
 
-    def _left_over(self, frequency: float, small: list[Array], images: list[Array]) -> tuple[float, Array]:
-        """The estimated error of the flexibility at a frequency, relative, and what a better basis needs, (n, 2 m).
-
-        small, images: M, C, K, S in the basis, (r, r), and of the basis, (n, r).
-        """
-        columns, factors = self.served.T, (-(frequency**2), 1j * frequency, 1.0, 1j)
-        y = np.linalg.solve(sum(f * z for f, z in zip(factors, small, strict=True)), self._shapes.T @ columns)
-        rest = columns - sum(f * (image @ y) for f, image in zip(factors, images, strict=True))
-        answers = self._solve(np.concatenate((rest.real, rest.imag), axis=1))
-        m = len(self.served)
+    def _left_over(self, frequency: float, images: _Images) -> tuple[float, Array]:
+        """The estimated error of the flexibility at a frequency, relative, and what a better basis needs, (n, 2 m)."""
+        columns, m = self.served.T, len(self.served)
+        mass, damping, stiffness, structural = images.small
+        dynamic = stiffness - frequency**2 * mass + 1j * (frequency * damping + structural)
+        y = np.linalg.solve(dynamic, self._shapes.T @ columns)
+        # real and imaginary parts side by side
+        parts = np.concatenate((y.real, y.imag), axis=1)
+        mass, damping, stiffness, structural = (whole @ parts for whole in images.whole)
+        elastic, lossy = stiffness - frequency**2 * mass, frequency * damping + structural
+        rest = np.concatenate((columns - elastic[:, :m] + lossy[:, m:], -elastic[:, m:] - lossy[:, :m]), axis=1)
+        answers = self._solve(rest)
         size = np.abs((self.served @ (self._shapes @ y)).diagonal())
-        wrong = np.abs(rest.T @ (answers[:, :m] + 1j * answers[:, m:])) / np.sqrt(np.multiply.outer(size, size))
-        return float(wrong.max()), answers / np.sqrt(np.tile(size, 2))
+        wrong = (rest[:, :m] + 1j * rest[:, m:]).T @ (answers[:, :m] + 1j * answers[:, m:])
+        worst = float((np.abs(wrong) / np.sqrt(np.multiply.outer(size, size))).max())
+        return worst, answers / np.sqrt(np.tile(size, 2))
 
-    def _add(self, candidates: Array, matrices: list[Any], images: list[Array]) -> None:
+    def _add(self, candidates: Array, images: _Images) -> None:
         """Add the span of candidates, orthonormal in the mass, without what is in the basis already."""
-        mass = matrices[0]
+        mass, seen = images.matrices[0], images.whole[0]
         for _ in range(2):
-            candidates = candidates - self._shapes @ (images[0].T @ candidates)
+            candidates = candidates - self._shapes @ (seen.T @ candidates)
         square = candidates.T @ (mass @ candidates)
         sizes, turn = np.linalg.eigh(0.5 * (square + square.T))
         kept = sizes > _WORTH**2 * sizes[-1]
@@ -206,12 +208,10 @@ class Reduction:
         kept[: max(0, len(kept) - (self.system.n - self._shapes.shape[1]))] = False
         new = candidates @ (turn[:, kept] / np.sqrt(sizes[kept]))
         for _ in range(2):
-            new = new - self._shapes @ (images[0].T @ new)
+            new = new - self._shapes @ (seen.T @ new)
             square = new.T @ (mass @ new)
             new = np.linalg.solve(np.linalg.cholesky(0.5 * (square + square.T)), new.T).T
-        self._shapes = np.concatenate((self._shapes, new), axis=1)
-        for i, matrix in enumerate(matrices):
-            images[i] = np.concatenate((images[i], matrix @ new), axis=1)
+        self._shapes = images.with_columns(self._shapes, new)
 
     def _project(self, values: Mapping[str, float]) -> Projected:
         """All matrices in the basis, turned to its modes at these values."""
@@ -232,6 +232,24 @@ class Reduction:
                 f"{shapes.shape[1]} vectors: keep fewer harmonics, or damp the structure more"
             )
         return Projected(matrices, shapes, seen, top, error)
+
+
+class _Images:
+    """M, C, K, S of a structure, (n, n), along its basis: of the basis (n, r) in `whole`, in it (r, r) in `small`."""
+
+    def __init__(self, matrices: list[Any], shapes: Array) -> None:
+        self.matrices = matrices
+        self.whole: list[Array] = [matrix @ shapes for matrix in matrices]
+        self.small: list[Array] = [shapes.T @ image for image in self.whole]
+
+    def with_columns(self, shapes: Array, new: Array) -> Array:
+        """The basis with new columns, and all of this with their images."""
+        result = np.concatenate((shapes, new), axis=1)
+        for i, matrix in enumerate(self.matrices):
+            image = matrix @ new
+            self.small[i] = np.block([[self.small[i], shapes.T @ image], [new.T @ self.whole[i], new.T @ image]])
+            self.whole[i] = np.concatenate((self.whole[i], image), axis=1)
+        return result
 
 
 #: reductions in use
