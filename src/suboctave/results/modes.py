@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import ArrayLike
 
+from suboctave.curves.trace import BranchPoint
 from suboctave.errors import InputError, shortened
-from suboctave.floquet.result import FloquetResult
 from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis, to_complex, to_real
 from suboctave.harmonic.condensed import linear_part_of
 from suboctave.harmonic.energy import action, fed, mean_energy, modal_amplitude, twice_kinetic
@@ -19,7 +19,7 @@ from suboctave.results.branch import TrackedBranch
 
 #: growth over a period that is none, where harmonics and rounding leave multipliers of a conservative motion off the
 #: unit circle
-_ON_CIRCLE = 1e-4
+ON_CIRCLE = 1e-4
 
 
 class ModeCurve(TrackedBranch):
@@ -76,7 +76,12 @@ class ModeCurve(TrackedBranch):
         (len,), bool. Of a damped one True: its motions are those of no system that stands by itself, and their
         stability is not told.
         """
-        return np.array([self.damped or _on_circle(point.floquet) for point in self.points], dtype=bool)
+        return np.array([self.damped or self._on_circle(point) for point in self.points], dtype=bool)
+
+    def _on_circle(self, point: BranchPoint) -> bool:
+        mu, errors = point.floquet.multipliers, point.floquet.errors
+        others = self.deciding(point, mu)
+        return bool(np.all(np.abs(mu[others]) <= 1.0 + np.maximum(ON_CIRCLE, errors[others])))
 
     def forcing(
         self, at: int | str | ArrayLike | None = None, system: System | None = None, harmonic: float = 1
@@ -145,13 +150,6 @@ class ModeCurve(TrackedBranch):
         form = "damped" if self.damped else "conservative"
         leaves = "" if self.departs is None else f"leaves {self.departs}; "
         return f"Nonlinear mode, {form}: {len(self)} points, {span}; {leaves}{self.ended}."
-
-
-def _on_circle(floquet: FloquetResult) -> bool:
-    """Whether all multipliers but the two that are +1 by themselves lie on the unit circle."""
-    others = np.argsort(np.abs(floquet.multipliers - 1.0), kind="stable")[2:]
-    sizes, errors = np.abs(floquet.multipliers[others]), floquet.errors[others]
-    return bool(np.all(sizes <= 1.0 + np.maximum(_ON_CIRCLE, errors)))
 
 
 def _direction(curve: ModeCurve, at: int | str | ArrayLike | None) -> Array:
