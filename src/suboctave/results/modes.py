@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from suboctave.curves.trace import BranchPoint
 from suboctave.errors import InputError, shortened
@@ -28,7 +29,8 @@ class ModeCurve(TrackedBranch):
     `system` is that of the mode: without oscillating loads, of the conservative form without damping matrices. Of a
     large damped structure `orbits` know the displacements that no force acts along but for what zeta makes of them.
     `bifurcations` has extrema of omega, and branch points (`switch_branch` follows the curve that crosses there); of a
-    conservative mode limit points (LP), where the energy turns, and period doublings (PD) as well.
+    conservative mode limit points (LP), where the energy turns, and period doublings (PD) as well. The curves of its
+    LP, BP and extrema of omega over a second parameter (`track`) are read in the same way.
     """
 
     @property
@@ -77,6 +79,12 @@ class ModeCurve(TrackedBranch):
         stability is not told.
         """
         return np.array([self.damped or self._on_circle(point) for point in self.points], dtype=bool)
+
+    def deciding(self, point: BranchPoint, multipliers: ComplexArray) -> NDArray[np.bool_]:
+        """See `Branch.deciding`: all but the two that are +1 by themselves, and two more on curves of LP and BP."""
+        others = np.ones(len(multipliers), dtype=bool)
+        others[np.argsort(np.abs(multipliers - 1.0), kind="stable")[: 4 if self.kind in ("LP", "BP") else 2]] = False
+        return others
 
     def _on_circle(self, point: BranchPoint) -> bool:
         mu, errors = point.floquet.multipliers, point.floquet.errors
@@ -145,6 +153,8 @@ class ModeCurve(TrackedBranch):
 
     @property
     def _head(self) -> str:
+        if len(self.names) > 1:
+            return super()._head
         values = self.omega
         span = f"omega from {values[0]:.6g} to {values[-1]:.6g}" if len(self) else "empty"
         form = "damped" if self.damped else "conservative"
@@ -188,6 +198,6 @@ def _powers(system: System, states: list[BalanceState], observe: int) -> Iterato
         yield 0.5 * float(np.vdot(velocity, force).real) + of_laws
 
 
-def tracked_class(kind: str) -> type[TrackedBranch]:
-    """The class of curves of a kind."""
-    return ModeCurve if kind == "nonlinear_mode" else TrackedBranch
+def tracked_class(options: Mapping[str, Any]) -> type[TrackedBranch]:
+    """The class of curves that were computed with these options."""
+    return ModeCurve if "damped" in options else TrackedBranch

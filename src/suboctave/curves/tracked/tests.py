@@ -120,7 +120,8 @@ class Extremum(CurveTest):
     @staticmethod
     def _beside_cusps(sample: Sample) -> bool:
         """Whether both parameters turn where the cusp's function vanishes, which it does not do here."""
-        return sample.curve.augmentation.name == "LP" and not sample.curve.augmentation.turning and sample.bend != 0.0
+        augmentation = sample.curve.augmentation
+        return augmentation.own.name == "LP" and not augmentation.turning and sample.bend != 0.0
 
     def extreme(self, before: float, at: Sample) -> str:
         rising = before * at.bend if self._beside_cusps(at) else before
@@ -477,7 +478,7 @@ def tests_of(curve: MotionProblem) -> tuple[CurveTest, ...]:
     """What to look for along a curve, by the kind of its bifurcations."""
     turns, own = tuple(Extremum(name) for name in curve.names), curve.augmentation.own
     if own.free_phase:
-        if curve.augmentation.turning or own.name not in MOTION_KINDS:
+        if curve.augmentation is not own or own.name not in MOTION_KINDS:
             return turns
         if isinstance(own, NonlinearMode):
             # the determinant of J_half costs less than multipliers, which nothing else asks for at every point
