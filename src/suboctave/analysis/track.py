@@ -90,10 +90,10 @@ def track(
     ----------
     bifurcation
         A located LP, BP, PD, NS or grazing of any branch (of motions of one or several load periods); a Hopf point of
-        equilibria; an LP, PD or NS of limit cycles; an LP, BP or extremum of omega of a nonlinear mode; one of the `extrema` of a tracked curve; or one of its points of
-        codimension two through which another curve passes, or from which one begins (GPD, R1, R2, LPPD, LPNS, PDNS,
-        NSNS). With `onto` a kind of motions also a user's event or a point of a branch, one of its `points`, beside the
-        curve.
+        equilibria; an LP, PD or NS of limit cycles; an LP, BP or extremum of omega of a nonlinear mode; one of the
+        `extrema` of a tracked curve; or one of its points of codimension two through which another curve passes, or
+        from which one begins (GPD, R1, R2, LPPD, LPNS, PDNS, NSNS). With `onto` a kind of motions also a user's event
+        or a point of a branch, one of its `points`, beside the curve.
     parameter
         The second parameter, omega being the first; or two names, with omega kept. Of an extremum the third one.
     bounds
@@ -370,6 +370,11 @@ def curve_onto(item: Bifurcation, onto: str | None) -> str:
                 f"this is a {item.kind}: leave it out"
             )
         return item.kind
+    if len(item.names) > 2 and not item.turning:
+        raise InputError(
+            f"this {item.kind} is one of limit cycles: no curve is entered from it; track begins at the other "
+            "bifurcation where it is located along cycles"
+        )
     if item.turning:
         raise InputError(
             f"this {item.kind} lies on a curve of extrema in {', '.join(item.names)}: other curves are entered from "

@@ -280,18 +280,39 @@ class Sample:
 
     @lazy
     def others(self) -> ComplexArray:
-        """Multipliers but the one, or the pair, that is critical all along the curve."""
+        """Multipliers but the one, or the pair, that is critical all along the curve, and of bifurcations of limit
+        cycles the one that is +1 by itself.
+        """
         mu, critical = self.evaluation.floquet.multipliers, self.evaluation.critical
         if critical is None:
             return mu
-        distance = np.minimum(np.abs(mu - critical), np.abs(mu - np.conj(critical)))
         augmentation = self.curve.augmentation
-        nearest, several = np.argsort(distance, kind="stable"), augmentation.name == "NS" or augmentation.trivial == 2
-        if several or mu[nearest[0]].imag == 0.0:
-            return np.delete(mu, nearest[: 2 if several else 1])
-        # two that are nearly the same came out as a pair, whose sum is known better than either
-        pair = np.abs(mu - np.conj(mu[nearest[0]])).argmin()
-        return np.append(np.delete(mu, [nearest[0], pair]), 2.0 * mu[nearest[0]].real - critical)
+        if augmentation.free_phase and augmentation.own.name in ("PD", "NS"):
+            mu = _without(mu, 1.0 + 0.0j, False)
+        return _without(mu, critical, augmentation.name == "NS" or augmentation.trivial == 2)
+
+    @lazy
+    def fold_of_cycles(self) -> tuple[float, float]:
+        """Sign and logarithm of the determinant of `[R_X R_omega; phase condition]`, rows of unit length: zero where
+        the family of limit cycles over the other parameters turns, or crosses another.
+        """
+        point, state, n = self.point, self.state, self.state.balance.dimension
+        weights = np.append(point.weights[:n], 1.0 / state.omega)
+        turning = state.basis.derivative(state.x).ravel() * point.weights[:n]
+        matrix = np.vstack((state.extended_jacobian("omega") / weights, np.append(turning, 0.0)))
+        sign, size = np.linalg.slogdet(matrix / np.linalg.norm(matrix, axis=1)[:, None])
+        return float(sign), float(size)
+
+
+def _without(mu: ComplexArray, critical: complex, several: bool) -> ComplexArray:
+    """Multipliers but the critical one, or pair."""
+    distance = np.minimum(np.abs(mu - critical), np.abs(mu - np.conj(critical)))
+    nearest = np.argsort(distance, kind="stable")
+    if several or mu[nearest[0]].imag == 0.0:
+        return np.delete(mu, nearest[: 2 if several else 1])
+    # two that are nearly the same came out as a pair, whose sum is known better than either
+    pair = np.abs(mu - np.conj(mu[nearest[0]])).argmin()
+    return np.append(np.delete(mu, [nearest[0], pair]), 2.0 * mu[nearest[0]].real - critical)
 
 
 @lru_cache(maxsize=64)

@@ -10,6 +10,7 @@
                       curves, as of NS points along a branch: a complex pair passes it
     NSNS              the same on NS curves
     LP, BP, PD, NS    the same on curves of motions that need no critical multiplier (`MOTION_KINDS`)
+    LPPD, LPNS        of limit cycles, where J_0 is singular all along: det [R_X R_omega; phase condition]
     LP, BP            of motions of a free phase, where J_0 is singular all along: the last parameter turns, of
                       conservative modes the action; the orientation of the curve changes
 
@@ -332,6 +333,29 @@ class RealCrossing(CurveTest):
 
 
 @dataclass(frozen=True)
+class FoldOfCycles(CurveTest):
+    """A second multiplier of limit cycles is +1: LPPD on curves of their PD, LPNS on those of their NS. J_0, which is
+    singular all along, is bordered by the phase condition and R_omega; `unit`: the logarithm of its size between
+    neighbours.
+    """
+
+    kind: str
+    unit: float = 0.0
+
+    def value(self, sample: Sample) -> float:
+        sign, size = sample.fold_of_cycles
+        return sign * math.exp(min(size - self.unit, _LARGE))
+
+    def within(self, a: Sample, b: Sample) -> CurveTest:
+        # where it is located again the function keeps its unit
+        return self if a is b else replace(self, unit=max(sample.fold_of_cycles[1] for sample in (a, b)))
+
+    def smooth(self, sample: Sample) -> tuple[float, float]:
+        sign, size = symmetric_functions(sample.others)[:, 0].tolist()
+        return sign, size
+
+
+@dataclass(frozen=True)
 class LimitOrBranchPoint(RealCrossing):
     """LP or BP of the motions that a curve consists of: the latter where no free parameter moves the multiplier."""
 
@@ -472,14 +496,27 @@ _OF_BIFURCATIONS: dict[Kind, tuple[CurveTest, ...]] = {
         PairCrossing("NSNS"),
     ),
 }
+#: the same of limit cycles; the criticality of their doublings is not known
+_OF_CYCLES: dict[Kind, tuple[CurveTest, ...]] = {
+    Kind.HALF: (DoubleMultiplier("R2"), FoldOfCycles("LPPD"), PairCrossing("PDNS")),
+    Kind.FREE: (
+        Resonance("R3", 3),
+        Resonance("R4", 4),
+        FoldOfCycles("LPNS"),
+        RealCrossing("PDNS", Kind.HALF),
+        PairCrossing("NSNS"),
+    ),
+}
 
 
 def tests_of(curve: MotionProblem) -> tuple[CurveTest, ...]:
     """What to look for along a curve, by the kind of its bifurcations."""
     turns, own = tuple(Extremum(name) for name in curve.names), curve.augmentation.own
     if own.free_phase:
-        if curve.augmentation is not own or own.name not in MOTION_KINDS:
+        if curve.augmentation is not own:
             return turns
+        if isinstance(own, SingularOperator):
+            return turns + _OF_CYCLES[own.kind]
         if isinstance(own, NonlinearMode):
             # the determinant of J_half costs less than multipliers, which nothing else asks for at every point
             return (
