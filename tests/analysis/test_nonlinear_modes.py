@@ -324,7 +324,7 @@ def test_wrong_use_is_refused_in_words(system, given, words):
 
 def test_what_a_mode_is_not_good_for(lower):
     (crossing,) = lower.bifurcations["BP"]
-    with pytest.raises(so.InputError, match="no curves in two parameters"):
+    with pytest.raises(so.InputError, match="unknown parameter 'k'"):
         so.track(crossing, "k", (0.1, 1.0))
     with pytest.raises(so.InputError, match=r"so\.nonlinear_mode follows it"):
         so.track(lower.points[3], "k", (0.1, 1.0), onto="nonlinear_mode")

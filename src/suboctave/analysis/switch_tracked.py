@@ -139,7 +139,7 @@ def switch_tracked(
     context = {"system": orbit.system, "parameter": name, **kept}
     met = [replace(event, context=context) for event in trace.bifurcations]
     departs = None if trace.departs is None else Junction.of(trace.departs)
-    return tracked_class(item.curve)(
+    return tracked_class(kept)(
         item.curve, item.names, orbit.system, name, trace.points, met, [], trace.closed, trace.endings,
         settings.observe, kept, tuple(trace.warnings), departs=departs,
     )  # fmt: skip

@@ -41,7 +41,15 @@ from suboctave.curves.motion import MotionEvaluation, MotionProblem
 from suboctave.curves.starts import check_unknowns, harmonics_of, rule_of
 from suboctave.curves.trace import BranchPoint, Settings, Trace
 from suboctave.curves.tracked.follow import follow_tracked
-from suboctave.curves.tracked.start import Ranges, curve_through, inside, is_extremum, on_free_phase, solved_start
+from suboctave.curves.tracked.start import (
+    Ranges,
+    curve_through,
+    inside,
+    is_extremum,
+    on_free_phase,
+    on_mode,
+    solved_start,
+)
 from suboctave.errors import ConvergenceError, InputError, is_number, shortened, suggest
 from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.evaluation import BalanceState
@@ -54,6 +62,7 @@ from suboctave.model.system import System
 from suboctave.options import with_options
 from suboctave.progress import reporting
 from suboctave.results.branch import TrackedBranch
+from suboctave.results.modes import tracked_class
 
 Range = tuple[float, float]
 
@@ -81,10 +90,10 @@ def track(
     ----------
     bifurcation
         A located LP, BP, PD, NS or grazing of any branch (of motions of one or several load periods); a Hopf point of
-        equilibria; an LP, PD or NS of limit cycles; one of the `extrema` of a tracked curve; or one of its points of
-        codimension two through which another curve passes, or from which one begins (GPD, R1, R2, LPPD, LPNS, PDNS,
-        NSNS). With `onto` a kind of motions also a user's event or a point of a branch, one of its `points`, beside the
-        curve.
+        equilibria; an LP, PD or NS of limit cycles; an LP, BP or extremum of omega of a nonlinear mode; one of the
+        `extrema` of a tracked curve; or one of its points of codimension two through which another curve passes, or
+        from which one begins (GPD, R1, R2, LPPD, LPNS, PDNS, NSNS). With `onto` a kind of motions also a user's event
+        or a point of a branch, one of its `points`, beside the curve.
     parameter
         The second parameter, omega being the first; or two names, with omega kept. Of an extremum the third one.
     bounds
@@ -121,7 +130,7 @@ def track(
     """
     item, through = begun(bifurcation, onto, options.get("observe"))
     turning = item.parameter_name if is_extremum(item) else ""
-    further = is_extremum(item) or on_free_phase(item)
+    further = is_extremum(item) or on_free_phase(item) or on_mode(item)
     names, given = (_third if further else _free)(item, parameter, bounds, omega)
     ranges = {name: (min(ends), max(ends)) for name, ends in given.items()}
     kind = curve_onto(item, through)
@@ -166,11 +175,11 @@ def _branch(
 ) -> TrackedBranch:
     """The curve that begins at a bifurcation, with how it was computed."""
     system, kind = item.orbit.system, kind_of(item)
-    if kind in MOTION_KINDS:
-        options = {**options, "onto": item.context["onto"]}
+    known, own = item.context or {}, ("onto", "damped", "mode") if kind in MOTION_KINDS else ("damped", "mode")
+    options = {**options, **{name: known[name] for name in own if name in known}}
     context = {"system": system, "parameter": names[-1], **options}
     met = [replace(event, context=context) for event in trace.bifurcations]
-    return TrackedBranch(
+    return tracked_class(options)(
         kind, names, system, names[-1], trace.points, met, [], trace.closed, trace.endings, settings.observe, options,
         tuple(trace.warnings), turning=turning,
     )  # fmt: skip
@@ -181,7 +190,7 @@ def _third(item: TrackedEvent, parameter: Any, bounds: Any, omega: Any) -> tuple
     extremum's curve keep theirs.
     """
     system = item.orbit.system
-    if len(item.names) != 2:
+    if len(item.names) > 2:
         raise InputError(
             f"this {item.kind} lies on a curve in {', '.join(item.names)}: only those along curves in two parameters "
             "can be followed in another one"
@@ -190,7 +199,7 @@ def _third(item: TrackedEvent, parameter: Any, bounds: Any, omega: Any) -> tuple
         raise InputError(f"this {item.kind} is followed in one more parameter: give its name, not {parameter!r}")
     check_parameter(system, parameter)
     if parameter in item.names:
-        raise InputError(f"{parameter} is free on the curve of this {item.kind} already: name a third parameter")
+        raise InputError(f"{parameter} is free on the curve of this {item.kind} already: name another parameter")
     if omega is not None and item.names[0] != "omega":
         raise InputError("omega= bounds omega where it is free, which it is not on the curve of this point")
     # a parameter of the extremum's curve keeps its range; if it is extreme, with as much again on both sides. That of
@@ -331,10 +340,10 @@ def begun(start: Any, onto: Any, observe: int | str | None) -> tuple[Any, str | 
     """What a curve begins at, and the kind that is chosen of those through it: a motion as a point of its own curve."""
     kind = motion_kind(onto)
     if kind is None:
-        if isinstance(start, TrackedEvent) and start.curve == NonlinearMode.name:
+        if isinstance(start, TrackedEvent) and on_mode(start) and start.kind == "PD":
             raise InputError(
-                f"this {start.kind} lies on a nonlinear mode, which has no curves in two parameters; switch_branch "
-                "follows what leaves a branch point or a period doubling"
+                "this PD lies on a nonlinear mode, of which LP, BP and extrema of omega are followed in a second "
+                "parameter: switch_branch follows the motions of twice the period"
             )
         return start, onto
     if not isinstance(start, Bifurcation | BranchPoint):
@@ -361,6 +370,11 @@ def curve_onto(item: Bifurcation, onto: str | None) -> str:
                 f"this is a {item.kind}: leave it out"
             )
         return item.kind
+    if len(item.names) > 2 and not item.turning:
+        raise InputError(
+            f"this {item.kind} is one of limit cycles: no curve is entered from it; track begins at the other "
+            "bifurcation where it is located along cycles"
+        )
     if item.turning:
         raise InputError(
             f"this {item.kind} lies on a curve of extrema in {', '.join(item.names)}: other curves are entered from "

@@ -116,6 +116,12 @@ class Augmentation(ABC):
         """The motion under forces that the extra unknowns make; as a rule the same."""
         return state
 
+    def unfolding(self, extra: Array) -> float:
+        """What must be zero of the extra unknowns, in units of the forces that balance, for the equations to mean what
+        they should.
+        """
+        return 0.0
+
     def multiplier(self, rate: float, extra: Array) -> complex | None:
         """The multiplier that lies on the unit circle at a solution, None if none need; rate: the base frequency."""
         return None

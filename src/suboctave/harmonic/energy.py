@@ -93,14 +93,21 @@ def damping_ratio(state: BalanceState) -> float:
     return float(np.vdot(moving, state.residual.reshape(moving.shape))) / (work or 1.0)
 
 
-def action_along(state: BalanceState, motion: Array, omega: float) -> float:
-    """The change of the action along changes of X, (dimension,), and omega, relative to it, of a conservative motion:
-    the action is `-1/4` times the sum of `k c . (dA/dOmega) c` over its harmonics c.
+def action_gradient(state: BalanceState) -> Array:
+    """The derivatives of `-4` times the action by X, (dimension,), and omega, of a conservative motion: the action is
+    `-1/4` times the sum of `k c . (dA/dOmega) c` over its harmonics c.
     """
     bend = state.basis.multiples[:, None, None] ** 2 * state.linear.stiffness(state.frequencies, 2)
-    held, turned = apply_blocks(state.slope, state.x), apply_blocks(bend, state.x)
-    change = 2.0 * np.vdot(state.balance.shaped(motion), held) + omega * np.vdot(state.x, turned)
-    return float(change) / (float(np.vdot(state.x, held)) or 1.0)
+    held = apply_blocks(state.slope, state.x)
+    return np.append(2.0 * held, float(np.vdot(state.x, apply_blocks(bend, state.x))))
+
+
+def action_along(state: BalanceState, motion: Array, omega: float) -> float:
+    """The change of the action along changes of X, (dimension,), and omega, relative to it."""
+    slope = action_gradient(state)
+    # the action is a square of X
+    whole = 0.5 * float(slope[:-1] @ state.unknowns)
+    return float(slope @ np.append(motion, omega)) / (whole or 1.0)
 
 
 def mean_energy(state: BalanceState) -> float:

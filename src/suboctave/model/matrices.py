@@ -100,6 +100,19 @@ class MatrixCoefficient:
         more = scipy.sparse.csr_array(matrix) if self.sparse else matrix
         return MatrixCoefficient(self._base + more, self._terms, self.what)
 
+    def less(self, factor: str, other: MatrixCoefficient) -> MatrixCoefficient:
+        """The difference from another matrix times an expression."""
+        import scipy.sparse
+
+        def like(pattern: Any) -> Any:
+            if self.sparse:
+                return scipy.sparse.csr_array(pattern)
+            return pattern.toarray() if other.sparse else pattern
+
+        terms = [(coefficient(f"-({factor})"), like(other._base))]
+        terms += [(coefficient(f"-({factor})*({c.text})"), like(pattern)) for c, pattern in other._terms]
+        return MatrixCoefficient(self._base, (*self._terms, *terms), self.what)
+
     @lazy
     def zero(self) -> bool:
         """Whether it is zero at any values of the parameters."""

@@ -272,6 +272,10 @@ class System:
         zeros = {name: self.mass.zeros(name) for name in ("damping", "structural")}
         return self._changed(**zeros)._pruned()
 
+    def fed(self, rate: str) -> System:
+        """The same system with the damping `C - rate M`, rate a new parameter, zero to begin with."""
+        return self._changed(damping=self.damping.less(rate, self.mass), parameters={**self.parameters, rate: 0.0})
+
     def _pruned(self) -> System:
         """The same without parameters that nothing depends on."""
         used = {name for _, source, _ in self.expressions() for name in source.names}

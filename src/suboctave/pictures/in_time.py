@@ -15,7 +15,7 @@ import numpy as np
 
 from suboctave.errors import InputError, chosen_dof, suggest
 from suboctave.pictures import style
-from suboctave.pictures.boundary import datasets_of
+from suboctave.pictures.boundary import boundary_drawing, datasets_of, is_boundary
 from suboctave.pictures.drawing import STROKES, Axis, Band, Entry, Frame, Guide, Markers, Polyline, Raster, dot, plain
 from suboctave.pictures.options import Coordinates, View, as_multiple, check_quantity, declared_units, shown_multiple
 from suboctave.pictures.paper import Layout, picture
@@ -410,13 +410,18 @@ def plot_verified(
 
     `unconfirmed` (B, 2): bifurcations that shooting did not confirm; they get a ring.
     """
-    axes = Coordinates((str(curve.attrs["free"]), None), View())
-    frame = response_frame([curve], axes)
+    if is_boundary(curve):
+        drawing = boundary_drawing([curve])
+        (frame,), (across, upwards) = drawing.frames, drawing.axes
+    else:
+        axes = Coordinates((str(curve.attrs["free"]), None), View())
+        frame = response_frame([curve], axes)
+        labels = axes.labels([curve])
+        across, upwards = Axis(labels[0]), Axis(labels[1], 0.0)
     every = np.concatenate([np.reshape(places, (-1, 2)), np.reshape(unconfirmed, (-1, 2))])
     kinds = np.array([*outcomes, *["not confirmed"] * len(unconfirmed)])
     for outcome, (name, mark, layer) in _MARKS.items():
         here = every[kinds == outcome]
         if len(here):
             frame.add(Markers(here.T, mark, role=outcome, layer=layer), name)
-    across, upwards = axes.labels([curve])
-    return frame, (Axis(across), Axis(upwards, 0.0))
+    return frame, (across, upwards)

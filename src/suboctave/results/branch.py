@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from suboctave.bifurcation.bifurcation import Bifurcation, BifurcationList, target_multiplier
 from suboctave.continuation.ending import Ending, interruption_of, sentence
@@ -222,6 +223,10 @@ class Branch(CurveTables, BranchReadings):
         """Whether each motion is stable, shape (len,), bool."""
         return np.array([p.floquet.stable for p in self.points])
 
+    def deciding(self, point: BranchPoint, multipliers: ComplexArray) -> NDArray[np.bool_]:
+        """Which multipliers of the motion at a point decide whether it is stable: all, (m,), bool."""
+        return np.ones(len(multipliers), dtype=bool)
+
     @property
     def verdicts(self) -> str:
         """How many motions are unstable, in words, and of how many that cannot be told: without damping."""
@@ -383,7 +388,8 @@ class TrackedBranch(Branch):
 
         Where they do, the curve is a border of stable motions.
         """
-        return np.array([self._others_inside(p) for p in self.points], dtype=bool)
+        sizes = ((p, np.abs(p.floquet.multipliers)) for p in self.points)
+        return np.array([np.all(mu[self.deciding(p, p.floquet.multipliers)] < 1.0) for p, mu in sizes], dtype=bool)
 
     @property
     def verdicts(self) -> str:
@@ -421,18 +427,20 @@ class TrackedBranch(Branch):
         """The points, with what only tracked curves have."""
         return tuple(point for point in self.points if isinstance(point, TrackedPoint))
 
-    def _others_inside(self, point: Any) -> bool:
-        mu = point.floquet.multipliers
-        target, count = target_multiplier(self.kind, point.extra * point.orbit.period), KINDS[self.kind].critical
+    def deciding(self, point: BranchPoint, multipliers: ComplexArray) -> NDArray[np.bool_]:
+        """See `Branch.deciding`: all but the critical ones."""
+        mu, others = multipliers, np.ones(len(multipliers), dtype=bool)
+        extra = point.extra if isinstance(point, TrackedPoint) else 0.0
+        target, count = target_multiplier(self.kind, extra * point.orbit.period), KINDS[self.kind].critical
         if KINDS[self.kind].free_phase and self.turning:
             count += 1
         elif len(self.names) == 3 and not self.turning:
             # bifurcations of limit cycles, which have a multiplier +1 besides
-            mu = np.delete(mu, np.abs(mu - 1.0).argmin())
+            others[np.abs(mu - 1.0).argmin()] = False
         if target is not None:
-            distance = np.minimum(np.abs(mu - target), np.abs(mu - np.conj(target)))
-            mu = np.delete(mu, np.argsort(distance, kind="stable")[:count])
-        return bool(np.all(np.abs(mu) < 1.0))
+            distance = np.where(others, np.minimum(np.abs(mu - target), np.abs(mu - np.conj(target))), np.inf)
+            others[np.argsort(distance, kind="stable")[:count]] = False
+        return others
 
     @property
     def _free(self) -> tuple[str, ...]:

@@ -243,7 +243,7 @@ class _Reader:
         given |= {"bifurcations": bifurcations, "events": own}
         if tracked := record.get("tracked"):
             kind, names, turning = tracked["kind"], tracked["names"], tracked.get("turning", "")
-            branch: Branch = tracked_class(kind)(kind, names, turning=turning, **given)
+            branch: Branch = tracked_class(given["options"])(kind, names, turning=turning, **given)
         else:
             branch = (Equilibria if "still" in given["options"] else Branch)(**given)
         branch.seconds = record["seconds"]

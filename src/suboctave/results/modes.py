@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
+from suboctave.curves.trace import BranchPoint
 from suboctave.errors import InputError, shortened
-from suboctave.floquet.result import FloquetResult
 from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis, to_complex, to_real
 from suboctave.harmonic.condensed import linear_part_of
 from suboctave.harmonic.energy import action, fed, mean_energy, modal_amplitude, twice_kinetic
@@ -19,7 +20,7 @@ from suboctave.results.branch import TrackedBranch
 
 #: growth over a period that is none, where harmonics and rounding leave multipliers of a conservative motion off the
 #: unit circle
-_ON_CIRCLE = 1e-4
+ON_CIRCLE = 1e-4
 
 
 class ModeCurve(TrackedBranch):
@@ -28,7 +29,8 @@ class ModeCurve(TrackedBranch):
     `system` is that of the mode: without oscillating loads, of the conservative form without damping matrices. Of a
     large damped structure `orbits` know the displacements that no force acts along but for what zeta makes of them.
     `bifurcations` has extrema of omega, and branch points (`switch_branch` follows the curve that crosses there); of a
-    conservative mode limit points (LP), where the energy turns, and period doublings (PD) as well.
+    conservative mode limit points (LP), where the energy turns, and period doublings (PD) as well. The curves of its
+    LP, BP and extrema of omega over a second parameter (`track`) are read in the same way.
     """
 
     @property
@@ -76,7 +78,18 @@ class ModeCurve(TrackedBranch):
         (len,), bool. Of a damped one True: its motions are those of no system that stands by itself, and their
         stability is not told.
         """
-        return np.array([self.damped or _on_circle(point.floquet) for point in self.points], dtype=bool)
+        return np.array([self.damped or self._on_circle(point) for point in self.points], dtype=bool)
+
+    def deciding(self, point: BranchPoint, multipliers: ComplexArray) -> NDArray[np.bool_]:
+        """See `Branch.deciding`: all but the two that are +1 by themselves, and two more on curves of LP and BP."""
+        others = np.ones(len(multipliers), dtype=bool)
+        others[np.argsort(np.abs(multipliers - 1.0), kind="stable")[: 4 if self.kind in ("LP", "BP") else 2]] = False
+        return others
+
+    def _on_circle(self, point: BranchPoint) -> bool:
+        mu, errors = point.floquet.multipliers, point.floquet.errors
+        others = self.deciding(point, mu)
+        return bool(np.all(np.abs(mu[others]) <= 1.0 + np.maximum(ON_CIRCLE, errors[others])))
 
     def forcing(
         self, at: int | str | ArrayLike | None = None, system: System | None = None, harmonic: float = 1
@@ -140,18 +153,13 @@ class ModeCurve(TrackedBranch):
 
     @property
     def _head(self) -> str:
+        if len(self.names) > 1:
+            return super()._head
         values = self.omega
         span = f"omega from {values[0]:.6g} to {values[-1]:.6g}" if len(self) else "empty"
         form = "damped" if self.damped else "conservative"
         leaves = "" if self.departs is None else f"leaves {self.departs}; "
         return f"Nonlinear mode, {form}: {len(self)} points, {span}; {leaves}{self.ended}."
-
-
-def _on_circle(floquet: FloquetResult) -> bool:
-    """Whether all multipliers but the two that are +1 by themselves lie on the unit circle."""
-    others = np.argsort(np.abs(floquet.multipliers - 1.0), kind="stable")[2:]
-    sizes, errors = np.abs(floquet.multipliers[others]), floquet.errors[others]
-    return bool(np.all(sizes <= 1.0 + np.maximum(_ON_CIRCLE, errors)))
 
 
 def _direction(curve: ModeCurve, at: int | str | ArrayLike | None) -> Array:
@@ -190,6 +198,6 @@ def _powers(system: System, states: list[BalanceState], observe: int) -> Iterato
         yield 0.5 * float(np.vdot(velocity, force).real) + of_laws
 
 
-def tracked_class(kind: str) -> type[TrackedBranch]:
-    """The class of curves of a kind."""
-    return ModeCurve if kind == "nonlinear_mode" else TrackedBranch
+def tracked_class(options: Mapping[str, Any]) -> type[TrackedBranch]:
+    """The class of curves that were computed with these options."""
+    return ModeCurve if "damped" in options else TrackedBranch

@@ -77,7 +77,10 @@ def verify_motion(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: fl
     known = None if isinstance(what, PeriodicOrbit) else what.floquet
     floquet = known or method_of(None).multipliers(motion.state())
     if floquet.method == "none":
-        raise InputError(f"there is nothing to hold this motion against: {floquet.note}")
+        raise InputError(
+            f"there is nothing to hold this motion against by itself, {floquet.note}: so.verify(curve, points=[...]) "
+            "integrates motions of its curve with the damping that keeps them going"
+        )
     whole = motion.start()
     start = system.reduced(whole)
     projection = system if isinstance(system, ProjectedSystem) else None
@@ -234,7 +237,7 @@ def pairing(computed: ComplexArray, true: ComplexArray, relative: bool = False) 
     cost = np.abs(computed[:, None] - true[None, :])
     if relative:
         cost = cost / np.maximum(1.0, np.abs(true))
-    return float(cost[linear_sum_assignment(cost)].max())
+    return float(cost[linear_sum_assignment(cost)].max(initial=0.0))
 
 
 def motion_of(what: Any | BranchPoint | Bifurcation) -> PeriodicOrbit:

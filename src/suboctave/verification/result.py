@@ -19,7 +19,7 @@ from suboctave.experiments.common import TimeResult
 from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.linear_part import LinearPart
 from suboctave.interruption import Interruption
-from suboctave.results.branch import Branch
+from suboctave.results.branch import Branch, TrackedBranch
 from suboctave.results.files import branch_from_dataset, branch_to_dataset
 from suboctave.store.layout import parameter_column
 from suboctave.store.plain import Recorded, flat, padded, recorded
@@ -226,13 +226,19 @@ class BranchVerification(TimeResult):
         """
         from suboctave.pictures.in_time import plot_verified
 
-        name = self.branch.name
-        at = self.branch.parameter(name)
-        places = np.array([(at[p.index], p.amplitude) for p in self.points]).reshape(-1, 2)
-        bad = [(b.parameters.get(name, b.omega), b.amplitude) for b in self.bifurcations if not b.agrees]
+        branch = self.branch
+        plane = branch.plane if isinstance(branch, TrackedBranch) else None
+        x, y = plane or (branch.name, "amplitude")
+        across, upwards = branch.parameter(x), branch.amplitude if plane is None else branch.parameter(y)
+        places = np.array([(across[p.index], upwards[p.index]) for p in self.points]).reshape(-1, 2)
+        bad = [
+            [{"omega": b.omega, "amplitude": b.amplitude, **b.parameters}[name] for name in (x, y)]
+            for b in self.bifurcations
+            if not b.agrees
+        ]
         wrong = np.array(bad).reshape(-1, 2)
         outcomes = [point.outcome for point in self.points]
-        return plot_verified(self.branch.to_xarray(), places, outcomes, wrong, path=path, **options)
+        return plot_verified(branch.to_xarray(), places, outcomes, wrong, path=path, **options)
 
     def _in_words(self) -> str:
         wrong = [*self.disagreements, *(b for b in self.bifurcations if not b.agrees)]

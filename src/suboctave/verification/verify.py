@@ -2,7 +2,7 @@
 
 A single motion or bifurcation is held against shooting from its states at t = 0. Of a branch every motion, every
 verdict and every bifurcation is held against shooting in time: the true motion beside each point is found by
-`timedomain.multiple_shooting` on the compiled flow, with free frequency, so that what counts is the distance to the
+`timedomain.multiple_shooting` on the compiled flow (`verification.shots`), so that what counts is the distance to the
 curve of true motions. A bifurcation is confirmed where its test function, computed in time, changes its sign along that
 curve within the tolerance; where that does not show it, shooting of the bifurcation alone has the last word.
 """
@@ -10,8 +10,7 @@ curve within the tolerance; where that does not show it, shooting of the bifurca
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
 from functools import partial
 from operator import index
 from typing import Any, overload
@@ -20,29 +19,23 @@ import numpy as np
 
 from suboctave.bifurcation.bifurcation import CONTACT_KINDS, Bifurcation
 from suboctave.continuation.linear import one_thread
-from suboctave.continuation.problem import Array
 from suboctave.curves.trace import BranchPoint
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.floquet.methods import StabilityMethod, method_of
 from suboctave.floquet.result import FloquetResult
-from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.interruption import Interruption, limited
 from suboctave.kinds import KINDS
 from suboctave.model.projected import ProjectedSystem
 from suboctave.model.system import System
 from suboctave.progress import reporting
-from suboctave.projection import system_of_motions
-from suboctave.results.branch import Branch, TrackedBranch
-from suboctave.timedomain import shoot
-from suboctave.timedomain.multiple_shooting import MultipleShooting, ShotMotions
+from suboctave.results.branch import Branch
+from suboctave.results.modes import ON_CIRCLE, ModeCurve
 from suboctave.verification.harmonics import left_out, up_to_harmonics
 from suboctave.verification.motions import (
     LOCATED,
     Verification,
     distance_from_gap,
-    distance_of,
-    largest_of,
     motion_of,
     pairing,
     verify_motion,
@@ -55,6 +48,7 @@ from suboctave.verification.result import (
     VerifiedBifurcation,
     VerifiedPoint,
 )
+from suboctave.verification.shots import Shot, Shots
 
 
 def stability(
@@ -93,31 +87,27 @@ def _verify_branch(
     workers: int | None,
     progress: Any,
 ) -> BranchVerification:
-    if isinstance(branch, TrackedBranch):
-        raise InputError(
-            f"a {branch.kind} curve is verified motion by motion: take its points or its .bifurcations one by one"
-        )
     if not len(branch):
         raise InputError("the branch has no points to verify")
     which = _chosen(len(branch), points, every)
     items = list(branch.bifurcations.met) if bifurcations else []
-    orbits = [branch.points[i].orbit for i in which]
-    shots = Shots([*orbits, *(item.orbit for item in items)], workers)
+    shots = Shots(branch, [*(branch.points[i].orbit for i in which), *(item.orbit for item in items)], workers)
     checked: list[VerifiedPoint] = []
     confirmed: list[VerifiedBifurcation] = []
     whole = len(which) + 4 * len(items)
     interruption: Interruption | None = None
     with reporting(progress, "verifying") as report, one_thread():
         try:
-            for i, shot in zip(which, shots.motions(orbits), strict=True):
+            for i, shot in zip(which, shots.motions(range(len(which))), strict=True):
                 if report is not None:
                     report(len(checked) / whole, f"{len(checked)} of {len(which)} points")
                 checked.append(_judged(branch, i, shot, tolerance))
-            quick = _quick(shots, items, tolerance)
+            quick = _quick(shots, branch, dict(enumerate(items, len(which))), tolerance)
             for done, item in enumerate(items):
                 if report is not None:
                     report((len(which) + 4 * done) / whole, f"{item.kind} at omega = {item.omega:.6g}")
-                confirmed.append(_confirmed(shots.system, item, quick.get(id(item)), tolerance, branch.observe))
+                own = quick.get(len(which) + done)
+                confirmed.append(_confirmed(shots.system, item, own, tolerance, branch.observe))
         except KeyboardInterrupt as cause:
             interruption = Interruption.of(cause)
     basis = shots.system.words if isinstance(shots.system, ProjectedSystem) else ""
@@ -153,28 +143,37 @@ def _judged(branch: Branch, i: int, shot: Shot, tolerance: float) -> VerifiedPoi
     point = branch.points[i]
     floquet, distance, multipliers = point.floquet, shot.distance, shot.multipliers
     stable, error, known = None, math.inf, floquet.applicable
+    computed = bool(branch.stable[i])
     if not shot.converged:
         outcome, reason = OPEN, "Shooting did not arrive at a motion from here"
         if distance > 100.0 * tolerance or not np.isfinite(distance):
             outcome, reason = DISAGREES, "Shooting finds no motion near: it leaves the place"
         distance, multipliers = math.inf, multipliers[:0]
     else:
-        margin = float(np.max(np.abs(multipliers))) - 1.0
+        deciding = branch.deciding(point, multipliers)
+        margin = float(np.max(np.abs(multipliers[deciding]), initial=0.0)) - 1.0
         doubt = float(np.max(shot.errors[np.abs(multipliers) > 0.5], initial=0.0))
-        stable = margin < 0.0
-        if known:
-            error = pairing(floquet.multipliers, multipliers, relative=True)
+        stable = margin < (max(ON_CIRCLE, doubt) if isinstance(branch, ModeCurve) else 0.0)
         allowed = tolerance + 10.0 * (floquet.error + doubt) + 100.0 * distance
+        if known:
+            own = floquet.multipliers
+            kept = branch.deciding(point, own)
+            error = pairing(own[kept], multipliers[deciding], relative=True)
+            # critical ones that meet part like a root of what is missed
+            critical = np.count_nonzero(~kept) or 1
+            error = max(error, pairing(own[~kept], multipliers[~deciding]) ** critical)
         if tolerance < distance <= left_out(point.orbit):
             outcome, reason = OPEN, up_to_harmonics(point.orbit, distance)
         elif distance > tolerance:
             outcome, reason = DISAGREES, f"Shooting arrives at another motion (relative distance {distance:.1e})"
+        elif isinstance(branch, ModeCurve) and branch.damped:
+            stable, outcome, reason = None, AGREES, "The same motion, kept going by the same damping"
         elif not known:
             outcome, reason = OPEN, "The same motion; the branch has no verdict here"
-        elif floquet.stable != stable and abs(margin) <= max(tolerance, doubt):
+        elif computed != stable and abs(margin) <= max(tolerance, doubt):
             near = f"the largest multiplier lies {abs(margin):.1e} from the unit circle"
             outcome, reason = OPEN, f"The same motion; {near}, too near to compare verdicts"
-        elif floquet.stable != stable:
+        elif computed != stable:
             verdict = "stable" if stable else "unstable"
             outcome, reason = DISAGREES, f"Shooting calls it {verdict}, harmonic balance the opposite"
         elif error > allowed:
@@ -183,18 +182,27 @@ def _judged(branch: Branch, i: int, shot: Shot, tolerance: float) -> VerifiedPoi
             outcome, reason = AGREES, "The same motion, the same verdict"
     return VerifiedPoint(
         i, point.orbit.omega, point.orbit.amplitude(branch.observe), distance, multipliers, shot.errors, error,
-        stable, floquet.stable if known else None, outcome, reason,
+        stable, computed if known else None, outcome, reason,
     )  # fmt: skip
 
 
-def _quick(shots: Shots, items: Sequence[Bifurcation], tolerance: float) -> dict[int, Shot]:
-    """The true motions at bifurcations: of those that have a test function along the curve, and of contacts."""
+def _quick(shots: Shots, branch: Branch, items: Mapping[int, Bifurcation], tolerance: float) -> dict[int, Shot]:
+    """The true motions at bifurcations, by number: of those with a test function along the curve, and of contacts."""
+    along: tuple[str, ...] = LOCATED
+    if isinstance(branch, ModeCurve):
+        # its limit points are turns of the energy
+        along = ("BP", "PD", "extremum")
+    elif shots.alone:
+        along = (*LOCATED, "extremum")
     found: dict[int, Shot] = {}
-    for kinds, reach in ((CONTACT_KINDS, None), (LOCATED, tolerance)):
-        own = [item for item in items if item.kind in kinds]
-        motions = shots.motions([item.orbit for item in own], [item.kind for item in own], reach)
-        found |= {id(item): shot for item, shot in zip(own, motions, strict=True)}
+    for kinds, reach in ((CONTACT_KINDS, None), (along, tolerance)):
+        own = [which for which, item in items.items() if item.kind in kinds]
+        found |= zip(own, shots.motions(own, [items[which].kind for which in own], reach), strict=True)
     return found
+
+
+def _named(item: Bifurcation) -> str:
+    return "extremum of omega" if item.kind == "extremum" else KINDS[item.kind].words
 
 
 def _confirmed(
@@ -206,142 +214,17 @@ def _confirmed(
             along = distance_from_gap(system.moved_to(item.orbit.values), item, shot.state, shot.omega)
             words = "The same motion, and it just reaches the gap"
         else:
-            along, words = abs(shot.along), f"Shooting finds {KINDS[item.kind].words} at omega = {shot.omega_there:.9g}"
+            along, words = abs(shot.along), f"Shooting finds {_named(item)} at omega = {shot.omega_there:.9g}"
         if along <= tolerance:
             return verdict(shot.omega_there, max(shot.distance, along), True, words)
+    if item.floquet.method == "none":
+        return verdict(math.nan, math.inf, False, f"Shooting finds no {_named(item)} within the tolerance")
     try:
         check = verify_motion(item, tolerance)
     except ConvergenceError as failure:
         return verdict(math.nan, math.inf, False, f"Shooting failed: {failure}")
     omega = math.nan if check.solution is None else check.solution.omega
     return verdict(omega, check.distance, check.agrees, check.reason)
-
-
-# ---------------------------------------------------------------------------------------- multiple shooting, in batches
-@dataclass(frozen=True)
-class Shot:
-    """The true motion beside one of harmonic balance, if `converged`.
-
-    A bifurcation lies `along` the curve of true motions from there, in units of the motion's size, at `omega_there`;
-    nan where none of the kind lies within the distance that was looked at, or none was looked for.
-    """
-
-    converged: bool
-    distance: float
-    state: Array
-    omega: float
-    multipliers: ComplexArray
-    errors: Array
-    along: float
-    omega_there: float
-
-
-class Shots:
-    """Multiple shooting from motions of one curve, which have one period.
-
-    Its differences take four trajectories for every coordinate and piece: projected structures, with dozens of
-    coordinates, are shot at once over the period, at the motion's frequency.
-    """
-
-    def __init__(self, orbits: Sequence[PeriodicOrbit], workers: int | None = None) -> None:
-        self.system = system_of_motions(orbits)
-        self.shooting = MultipleShooting(self.system, orbits[0].basis.nu, workers)
-        self.projected = isinstance(self.system, ProjectedSystem)
-
-    def motions(
-        self, orbits: Sequence[PeriodicOrbit], kinds: Sequence[str] = (), reach: float | None = None
-    ) -> Iterator[Shot]:
-        """The true motions beside these; where bifurcations of these kinds lie within `reach` on either side."""
-        if self.projected:
-            yield from map(self._single, orbits)
-            return
-        count = self.shooting.at_once
-        for begin in range(0, len(orbits), count):
-            end = begin + count
-            yield from self._batch(orbits[begin:end], kinds[begin:end], reach)
-
-    def _single(self, orbit: PeriodicOrbit) -> Shot:
-        start = self.system.reduced(orbit.start())
-        try:
-            found = shoot(self.system, start, orbit.omega, orbit.basis.nu, orbit.values)
-        except ConvergenceError:
-            none = np.zeros(0, dtype=complex)
-            return Shot(False, math.inf, start, orbit.omega, none, none.real, math.nan, math.nan)
-        distance = distance_of(self.system, orbit, start, found)
-        doubt = np.full(len(found.multipliers), found.residual)
-        return Shot(True, distance, found.state, found.omega, found.multipliers, doubt, math.nan, found.omega)
-
-    def _batch(self, orbits: Sequence[PeriodicOrbit], kinds: Sequence[str], reach: float | None) -> list[Shot]:
-        states, omega, parameters, sizes = self._starts(orbits)
-        middle = self.shooting.solve(states, omega, parameters, sizes)
-        multipliers, errors = middle.multipliers()
-        distance = np.max(np.abs(middle.states - states) / sizes[:, None, :], axis=(1, 2))
-        distance = np.maximum(distance, np.abs(middle.omega - omega) / omega)
-        places = [(math.nan, float(there)) for there in middle.omega]
-        if reach is not None:
-            t = np.where(np.isfinite(middle.tangent), middle.tangent, 0.0)
-            sides = []
-            for way in (-reach, reach):
-                y = middle.states + way * t[:, :-1].reshape(states.shape) * sizes[:, None, :]
-                sides.append(self.shooting.solve(y, middle.omega * (1.0 + way * t[:, -1]), parameters, sizes, along=t))
-            places = [_place(kind, [sides[0], middle, sides[1]], b, reach) for b, kind in enumerate(kinds)]
-        return [
-            Shot(bool(middle.converged[b]), float(distance[b]), middle.states[b, 0], float(middle.omega[b]),
-                 multipliers[b], errors[b], *place)
-            for b, place in enumerate(places)
-        ]  # fmt: skip
-
-    def _starts(self, orbits: Sequence[PeriodicOrbit]) -> tuple[Array, Array, dict[str, Array], Array]:
-        share = np.arange(self.shooting.pieces) / self.shooting.pieces
-        states, sizes = [], []
-        for orbit in orbits:
-            t = share * orbit.period
-            states.append(self.system.reduced(np.hstack([orbit.displacement(t).T, orbit.velocity(t).T])))
-            x, v = largest_of(orbit, self.system)
-            # a motion at rest has no size of its own
-            sizes.append(np.repeat([x or 1.0, v or orbit.omega], self.system.n))
-        values = {name: np.array([orbit.values[name] for orbit in orbits]) for name in self.system.parameters}
-        parameters = {name: own for name, own in values.items() if (own != self.system.parameters[name]).any()}
-        return np.array(states), np.array([o.omega for o in orbits]), parameters, np.array(sizes)
-
-
-def _place(kind: str, at: list[ShotMotions], b: int, reach: float) -> tuple[float, float]:
-    """Where the test function of a kind vanishes along the curve, and omega there; nan where it keeps its sign."""
-    if not all(motions.converged[b] for motions in at):
-        return math.nan, math.nan
-    values = [_test(kind, motions, b) for motions in at]
-    if kind == "NS":
-        values = _pair(values)
-    if not values[0] * values[2] < 0.0:
-        return math.nan, math.nan
-    # a parabola through the three, and where it vanishes between the sides
-    c, a, d = (float(value) for value in np.polyfit((-1.0, 0.0, 1.0), values, 2))
-    roots = np.roots([c, a, d]) if c != 0.0 else np.array([-d / a])
-    inside = [float(root.real) for root in roots if abs(root.imag) < 1e-12 and abs(root.real) <= 1.0]
-    share = min(inside, key=abs) if inside else 0.0
-    bend = np.polyfit((-1.0, 0.0, 1.0), [float(motions.omega[b]) for motions in at], 2)
-    return reach * share, float(np.polyval(bend, share))
-
-
-def _test(kind: str, motions: ShotMotions, b: int) -> Any:
-    """What changes its sign at a bifurcation; of a Neimark-Sacker point all multipliers of pairs."""
-    monodromy = motions.monodromy[b]
-    if kind == "LP":
-        return float(motions.tangent[b, -1])
-    if kind == "BP":
-        return float(motions.border[b])
-    if kind == "PD":
-        return float(np.linalg.det(monodromy + np.eye(len(monodromy))))
-    multipliers = np.linalg.eigvals(monodromy)
-    return multipliers[multipliers.imag > 1e-9 * np.abs(multipliers)]
-
-
-def _pair(pairs: list[Any]) -> list[float]:
-    """|mu|^2 - 1 of the pair that is nearest to the unit circle in the middle, followed to either side."""
-    if not all(map(len, pairs)):
-        return [1.0, 1.0, 1.0]
-    own = pairs[1][np.argmin(np.abs(np.abs(pairs[1]) - 1.0))]
-    return [float(abs(solved[np.argmin(np.abs(solved - own))]) ** 2 - 1.0) for solved in pairs]
 
 
 @overload
@@ -379,7 +262,8 @@ def verify(
     what
         A motion; a `Bifurcation` is located again by shooting, with free omega; at a grazing the motion found at the
         same omega must just reach the gap. Of a `Branch` every point and every bifurcation is held against the curve of
-        true motions, found by multiple shooting; the answer is a `BranchVerification`.
+        true motions, found by multiple shooting; the answer is a `BranchVerification`. Limit cycles are corrected with
+        their parameter, motions of nonlinear modes with the artificial damping that keeps them going.
     tolerance
         Relative distance up to which two motions, and two frequencies, count as the same. Verdicts that differ where
         the true multiplier lies so near to the unit circle are not compared.

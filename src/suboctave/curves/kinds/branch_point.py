@@ -59,6 +59,9 @@ class BranchPointUnfolded(Augmentation):
     def multiplier(self, rate: float, extra: Array) -> complex:
         return 1.0 + 0.0j
 
+    def unfolding(self, extra: Array) -> float:
+        return float(extra[0])
+
     def at(self, state: BalanceState, extra: Array, names: tuple[str, ...]) -> BranchPointEquations:
         return BranchPointEquations(self, state, float(extra[0]), names)
 

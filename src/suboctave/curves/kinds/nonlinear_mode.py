@@ -24,6 +24,9 @@ from suboctave.harmonic.energy import damping_ratio, fed
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.lazy import lazy
 
+#: step of the difference by which masses enter, in units of the parameter
+_STEP = 1e-5
+
 
 @dataclass(frozen=True)
 class NonlinearMode(LimitCycle):
@@ -74,7 +77,7 @@ class ModeEquations(CycleEquations):
         super().__init__(of, state, names)
         self.zeta = zeta
         #: R differentiated by zeta
-        self.column: Array = 2.0 * state.omega * apply_blocks(state.linear.feeding(state.frequencies), state.x).ravel()
+        self.column: Array = _by_zeta(state)
 
     @lazy
     def rows(self) -> Array:
@@ -84,8 +87,25 @@ class ModeEquations(CycleEquations):
         out, n = super().jacobian(names), self.state.balance.dimension
         # omega is a factor of the rate
         out[:n, n + 1] += self.zeta / self.state.omega * self.column
+        for i, name in enumerate(names[1:], n + 2):
+            if self.zeta and name in self.state.balance.system.mass.names:
+                out[:n, i] += self.zeta * self._column_by(name)
         return out
+
+    def _column_by(self, name: str) -> Array:
+        """The derivative of `column` by a parameter that masses depend on: a central difference."""
+        state, value = self.state, self.state.values[name]
+        step = _STEP * (abs(value) or 1.0)
+        beside = [{**state.values, name: value + side * step} for side in (1.0, -1.0)]
+        ahead, behind = (_by_zeta(state.balance.at(state.x, state.omega, values)) for values in beside)
+        return (ahead - behind) / (2.0 * step)
 
     def renewed(self) -> NonlinearMode:
         own = super().renewed()
         return replace(self.of, reference=own.reference, basis=own.basis, size=own.size)
+
+
+def _by_zeta(state: BalanceState) -> Array:
+    """R differentiated by zeta, (dimension,)."""
+    fed_by = apply_blocks(state.linear.feeding(state.frequencies), state.x)
+    return np.asarray(2.0 * state.omega * fed_by).ravel()

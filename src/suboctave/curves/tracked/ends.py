@@ -92,14 +92,12 @@ def end_between(a: Sample, b: Sample, newton: NewtonOptions, lopsided: bool = Tr
     """The end of a curve between two neighbours, None if it goes on; lopsided: whether its motions had no half-wave
     symmetry where it began.
     """
-    augmentation = b.curve.augmentation.own
-    if isinstance(augmentation, BranchPointUnfolded):
-        beta = float(b.evaluation.extra[0])
-        if abs(beta) > _UNFOLDING:
-            return End(
-                f"the branch points end after {a.where}: their unfolding is {beta:.1e} at "
-                f"{b.where}, the symmetry that forces them is broken there"
-            )
+    augmentation, beta = b.curve.augmentation.own, b.curve.augmentation.unfolding(b.evaluation.extra)
+    if abs(beta) > _UNFOLDING:
+        return End(
+            f"the branch points end after {a.where}: their unfolding is {beta:.1e} at "
+            f"{b.where}, the symmetry that forces them is broken there"
+        )
     if augmentation.free_phase and vanished(a, b):
         return _in_its_parent(a, b)
     target = resonant_between(a, b)

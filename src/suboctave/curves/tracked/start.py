@@ -17,6 +17,8 @@ from suboctave.curves.augmentation import Augmentation
 from suboctave.curves.events.formulation import BORDERED, Formulation
 from suboctave.curves.kinds.extremum import BorderedExtremal, LimitPointExtremal
 from suboctave.curves.kinds.limit_cycle import CycleWith
+from suboctave.curves.kinds.mode_event import ModeEvent
+from suboctave.curves.kinds.nonlinear_mode import NonlinearMode
 from suboctave.curves.kinds.singular import SingularOperator
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.starts import own_linear_part, settled
@@ -55,6 +57,11 @@ def on_free_phase(item: Bifurcation) -> bool:
     )
 
 
+def on_mode(item: Bifurcation) -> bool:
+    """Whether something was located along a nonlinear mode, where omega alone is free."""
+    return isinstance(item, TrackedEvent) and item.curve == NonlinearMode.name and len(item.names) == 1
+
+
 def curve_through(
     item: Bifurcation,
     basis: HarmonicBasis,
@@ -74,7 +81,9 @@ def curve_through(
     x = orbit.basis.resized(orbit.x, basis)
     balance = HarmonicBalance(orbit.system, basis, linear=own_linear_part(orbit)).settle(x, orbit.omega)
     state = balance.at(x, orbit.omega)
-    equations = CycleWith if on_free_phase(item) else formulation.equations(kind_of(item))
+    equations: type[Augmentation] = CycleWith if on_free_phase(item) else formulation.equations(kind_of(item))
+    if on_mode(item) and len(names) == 2:
+        equations = ModeEvent
     augmentation, extra = equations.through(item, state, names)
     force = state.balanced.scale
     curve = MotionProblem(
@@ -124,7 +133,7 @@ def solved_start(
     curve, u = curve_through(item, basis, names, ranges, adaptive, settings.formulation)
     for name, (low, high) in ranges.items():
         u[curve.index(name)] = min(high, max(low, u[curve.index(name)]))
-    if is_extremum(item):
+    if is_extremum(item) and not on_mode(item):
         curve = with_extremum(curve, u, item.parameter_name)
     anywhere = item.kind in MOTION_KINDS
 

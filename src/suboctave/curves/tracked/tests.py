@@ -10,6 +10,7 @@
                       curves, as of NS points along a branch: a complex pair passes it
     NSNS              the same on NS curves
     LP, BP, PD, NS    the same on curves of motions that need no critical multiplier (`MOTION_KINDS`)
+    LPPD, LPNS        of limit cycles, where J_0 is singular all along: det [R_X R_omega; phase condition]
     LP, BP            of motions of a free phase, where J_0 is singular all along: the last parameter turns, of
                       conservative modes the action; the orientation of the curve changes
 
@@ -120,7 +121,8 @@ class Extremum(CurveTest):
     @staticmethod
     def _beside_cusps(sample: Sample) -> bool:
         """Whether both parameters turn where the cusp's function vanishes, which it does not do here."""
-        return sample.curve.augmentation.name == "LP" and not sample.curve.augmentation.turning and sample.bend != 0.0
+        augmentation = sample.curve.augmentation
+        return augmentation.own.name == "LP" and not augmentation.turning and sample.bend != 0.0
 
     def extreme(self, before: float, at: Sample) -> str:
         rising = before * at.bend if self._beside_cusps(at) else before
@@ -249,11 +251,11 @@ class GeneralisedDoubling(CurveTest):
 
     def value(self, sample: Sample) -> float:
         # at a fold-flip c3 passes through infinity, and det J_0 through zero
-        return sample.cubic * sample.sign(Kind.INTEGER)
+        return sample.cubic * sample.fold[0]
 
     def smooth(self, sample: Sample) -> tuple[float, float]:
         sign, size = super().smooth(sample)
-        return sign, size + sample.determinant(Kind.INTEGER)[1]
+        return sign, size + sample.fold[1]
 
 
 @dataclass(frozen=True)
@@ -328,6 +330,29 @@ class RealCrossing(CurveTest):
         apart = critical is None or abs(critical - target) > _RESONANT
         error = float(sample.evaluation.floquet.errors.max(initial=0.0))
         return apart or bool(np.any(np.abs(sample.others - target) < _CRITICAL + error))
+
+
+@dataclass(frozen=True)
+class FoldOfCycles(CurveTest):
+    """A second multiplier of limit cycles is +1: LPPD on curves of their PD, LPNS on those of their NS. J_0, which is
+    singular all along, is bordered by the phase condition and R_omega; `unit`: the logarithm of its size between
+    neighbours.
+    """
+
+    kind: str
+    unit: float = 0.0
+
+    def value(self, sample: Sample) -> float:
+        sign, size = sample.fold_of_cycles
+        return sign * math.exp(min(size - self.unit, _LARGE))
+
+    def within(self, a: Sample, b: Sample) -> CurveTest:
+        # where it is located again the function keeps its unit
+        return self if a is b else replace(self, unit=max(sample.fold_of_cycles[1] for sample in (a, b)))
+
+    def smooth(self, sample: Sample) -> tuple[float, float]:
+        sign, size = symmetric_functions(sample.others)[:, 0].tolist()
+        return sign, size
 
 
 @dataclass(frozen=True)
@@ -471,14 +496,27 @@ _OF_BIFURCATIONS: dict[Kind, tuple[CurveTest, ...]] = {
         PairCrossing("NSNS"),
     ),
 }
+#: the same of limit cycles
+_OF_CYCLES: dict[Kind, tuple[CurveTest, ...]] = {
+    Kind.HALF: (GeneralisedDoubling(), DoubleMultiplier("R2"), FoldOfCycles("LPPD"), PairCrossing("PDNS")),
+    Kind.FREE: (
+        Resonance("R3", 3),
+        Resonance("R4", 4),
+        FoldOfCycles("LPNS"),
+        RealCrossing("PDNS", Kind.HALF),
+        PairCrossing("NSNS"),
+    ),
+}
 
 
 def tests_of(curve: MotionProblem) -> tuple[CurveTest, ...]:
     """What to look for along a curve, by the kind of its bifurcations."""
     turns, own = tuple(Extremum(name) for name in curve.names), curve.augmentation.own
     if own.free_phase:
-        if curve.augmentation.turning or own.name not in MOTION_KINDS:
+        if curve.augmentation is not own:
             return turns
+        if isinstance(own, SingularOperator):
+            return turns + _OF_CYCLES[own.kind]
         if isinstance(own, NonlinearMode):
             # the determinant of J_half costs less than multipliers, which nothing else asks for at every point
             return (

@@ -16,7 +16,6 @@ from suboctave.experiments.common import check_plane
 from suboctave.experiments.lyapunov import lyapunov_exponents
 from suboctave.experiments.stepped_sine import check_stepped_sine, stepped_sine
 from suboctave.model.inputs import check_range
-from suboctave.results.branch import TrackedBranch
 from suboctave.store.plain import padded
 from suboctave.store.table import Table
 from suboctave.study.steps.base import (
@@ -154,20 +153,10 @@ class Verify(BranchStep, kind="verify"):
         branch = self.branch.of(context.results)
         points = [] if self.what == "bifurcations" else range(0, len(branch), self.every)
         bifurcations = self.what != "points"
-        whole, rows = None, []
-        if isinstance(branch, TrackedBranch):  # its points as motions, and its special points, one by one
-            things: list[tuple[str, Any]] = [(f"point {i}", branch.points[i]) for i in points]
-            things += [(item.kind, item) for item in branch.bifurcations.met] if bifurcations else []
-            for done, (name, thing) in enumerate(things):
-                if context.progress is not None:
-                    context.progress(done / len(things), name)
-                one = verify(thing, self.tolerance)
-                rows.append(_row(name, thing.orbit.omega, one, one.multiplier_error, one.stable))
-        else:
-            asked: dict[str, Any] = {"points": points, "bifurcations": bifurcations, "progress": context.progress}
-            whole = verify(branch, self.tolerance, **asked)
-            rows = [_row(f"point {p.index}", p.omega, p, p.multiplier_error, p.stable, p.outcome) for p in whole.points]
-            rows += [_row(b.kind, b.omega, b) for b in whole.bifurcations]
+        asked: dict[str, Any] = {"points": points, "bifurcations": bifurcations, "progress": context.progress}
+        whole = verify(branch, self.tolerance, **asked)
+        rows = [_row(f"point {p.index}", p.omega, p, p.multiplier_error, p.stable, p.outcome) for p in whole.points]
+        rows += [_row(b.kind, b.omega, b) for b in whole.bifurcations]
         names = ("what", "omega", "distance", "multiplier_error", "stable", "agrees", "outcome", "reason")
         table = Table.of_rows(names, rows, f"{self.branch.words}, held against shooting")
         return Table(table.columns, table.title, whole)
