@@ -256,6 +256,24 @@ def test_a_condensed_structure_has_its_mass(damped):
         assert loads[1] == pytest.approx(curves[1].forcing(0)[-1], rel=1e-8)
 
 
+def test_a_damped_mode_moves_where_no_force_acts(tmp_path):
+    """With `-2 zeta omega` per unit of mass the equations hold at all masses, also of a mode read from a file."""
+    n = 6
+    stiffness = 2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
+    system = so.System(np.eye(n), 0.1 * stiffness, stiffness, [so.CubicSpring(0, 1.0)])
+    mode = so.nonlinear_mode(system, amplitude=(0.1, 1.0), damped=True, harmonics=7, observe=n - 1)
+    mode.save(tmp_path / "mode.nc")
+    for read in (mode, so.load(tmp_path / "mode.nc")):
+        for i in (len(read) // 2, len(read) - 1):
+            orbit, zeta = read.orbits[i], read.damping_ratio[i]
+            fed = system.damping.value({}) - 2.0 * zeta * orbit.omega * np.eye(n)
+            for k, c in enumerate(orbit.amplitudes):
+                w = k * orbit.omega
+                force = (stiffness - w**2 * np.eye(n) + 1j * w * fed) @ c
+                assert np.abs(force[1:]).max() < 1e-10
+        assert read.amplitude[-1] == pytest.approx(1.0, rel=1e-10)
+
+
 def test_saved_and_read_again(tongue, tmp_path):
     tongue.save(tmp_path / "tongue.nc")
     again = so.load(tmp_path / "tongue.nc")

@@ -112,9 +112,9 @@ class Augmentation(ABC):
     def at(self, state: BalanceState, extra: Array, names: tuple[str, ...]) -> Equations:
         """Evaluate at a motion, values of the extra unknowns, and the names of the free parameters."""
 
-    def kept_going(self, state: BalanceState, extra: Array) -> BalanceState:
-        """The motion under forces that the extra unknowns make; as a rule the same."""
-        return state
+    def zeta(self, extra: Array) -> float:
+        """The damping ratio that keeps the motions of a mode going, see `energy.fed`."""
+        return 0.0
 
     def unfolding(self, extra: Array) -> float:
         """What must be zero of the extra unknowns, in units of the forces that balance, for the equations to mean what

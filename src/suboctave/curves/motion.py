@@ -25,6 +25,7 @@ from suboctave.errors import ConvergenceError
 from suboctave.floquet.monodromy import floquet_multipliers
 from suboctave.floquet.result import FloquetResult
 from suboctave.harmonic.basis import HarmonicBasis
+from suboctave.harmonic.energy import fed
 from suboctave.harmonic.evaluation import BalanceState, HarmonicBalance
 from suboctave.harmonic.truncation import (
     AdaptiveHarmonics,
@@ -251,8 +252,12 @@ class MotionProblem:
         x, omega, values = self.split(u)
         if not omega > 0.0:
             raise ConvergenceError("omega is not positive")
-        state, extra = self.balance.at(x, omega, values), self.extra(u)
-        return MotionEvaluation(self, self.augmentation.kept_going(state, extra) if extra.size else state, extra)
+        extra = self.extra(u)
+        return MotionEvaluation(self, fed(self.balance.at(x, omega, values), self.zeta(extra)), extra)
+
+    def zeta(self, extra: Array) -> float:
+        """See `Augmentation.zeta`."""
+        return self.augmentation.own.zeta(extra) if extra.size else 0.0
 
     def size(self, u: Array) -> float:
         """Norm of the coefficients, weighted by the square roots of the masses."""

@@ -79,7 +79,7 @@ class Sample:
         """The motion."""
         state, evaluation = self.state, self.evaluation
         known = dict(state.values), evaluation.error, evaluation.truncation, self.curve.adaptive
-        return PeriodicOrbit(state.balance, state.x.copy(), state.omega, *known)
+        return PeriodicOrbit(state.balance, state.x.copy(), state.omega, *known, zeta=self.curve.zeta(evaluation.extra))
 
     # ------------------------------------------------------------------------------------------ along responses
     @lazy

@@ -52,6 +52,8 @@ def at_rest(balance: HarmonicBalance, omega: float, values: Mapping[str, float])
 
 #: zeta whose forces are lost among those of inertia
 _ROUNDING = float(np.finfo(float).eps)
+#: corrections of zeta, each of which leaves its share of the one before
+_REPEATED = 4
 
 
 def fed(state: BalanceState, zeta: float) -> BalanceState:
@@ -87,6 +89,14 @@ def modal_amplitude(state: BalanceState) -> float:
 
 def damping_ratio(state: BalanceState) -> float:
     """zeta with which a damping of -2 zeta omega per unit of mass balances the work of the forces over a period."""
+    zeta = 0.0
+    for _ in range(_REPEATED):
+        zeta += _missing(fed(state, zeta))
+    return zeta
+
+
+def _missing(state: BalanceState) -> float:
+    """What zeta lacks, to first order: of a condensed structure it moves what is eliminated, too."""
     moving = state.basis.derivative(state.x)
     momentum = apply_blocks(state.linear.feeding(state.frequencies), state.x)
     work = -2.0 * state.omega * float(np.vdot(moving, momentum))

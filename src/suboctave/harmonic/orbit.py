@@ -11,6 +11,7 @@ import numpy as np
 
 from suboctave.errors import InputError, shortened
 from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis, harmonic_index, to_complex, to_real
+from suboctave.harmonic.energy import fed
 from suboctave.harmonic.evaluation import BalanceState, HarmonicBalance
 from suboctave.harmonic.linear_part import LinearPart
 from suboctave.harmonic.trigonometric import motion, peak
@@ -43,6 +44,9 @@ class PeriodicOrbit:
         Estimated size of the neglected harmonics of the motion, relative to the motion (0 if not estimated).
     adaptive
         The rule its harmonics were chosen by, None if their number was given; curves continued from it inherit it.
+    zeta
+        Of a nonlinear mode the damping ratio that keeps it going: a damping of `-2 zeta omega` per unit of mass, which
+        has its share in what moves where no force acts. The equations are those without it.
     """
 
     balance: HarmonicBalance
@@ -52,6 +56,7 @@ class PeriodicOrbit:
     residual: float
     truncation: float = 0.0
     adaptive: AdaptiveHarmonics | None = None
+    zeta: float = 0.0
 
     @property
     def basis(self) -> HarmonicBasis:
@@ -85,7 +90,7 @@ class PeriodicOrbit:
     @cached_property
     def _linear(self) -> LinearPart:
         """The linear part at the motion's parameters and frequencies."""
-        return self.balance.linear_at(self.omega, self.values)
+        return fed(self.state(), self.zeta).linear
 
     @cached_property
     def _moving(self) -> ComplexArray:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,6 +26,7 @@ from suboctave.errors import InputError
 from suboctave.floquet.result import FloquetResult
 from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.condensed import Condensed, linear_part_of
+from suboctave.harmonic.energy import damping_ratio
 from suboctave.harmonic.evaluation import HarmonicBalance
 from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
 from suboctave.harmonic.orbit import PeriodicOrbit
@@ -229,6 +230,8 @@ class _Reader:
         omega, values, residual, truncation = numbers
         adaptive = None if rule < 0 else self.tables["rules"][rule]
         orbit = PeriodicOrbit(balance, x, omega, values, residual, truncation, adaptive)
+        if self.record.get("options", {}).get("damped"):
+            orbit = replace(orbit, zeta=damping_ratio(orbit.state()))
         return orbit, FloquetResult(multipliers, errors, **verdict)
 
     def branch(self) -> Branch:

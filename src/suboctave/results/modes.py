@@ -26,8 +26,7 @@ ON_CIRCLE = 1e-4
 class ModeCurve(TrackedBranch):
     """A nonlinear mode over its energy; read like a `Branch` over omega, `amplitude` is that of the observed DOF.
 
-    `system` is that of the mode: without oscillating loads, of the conservative form without damping matrices. Of a
-    large damped structure `orbits` know the displacements that no force acts along but for what zeta makes of them.
+    `system` is that of the mode: without oscillating loads, of the conservative form without damping matrices.
     `bifurcations` has extrema of omega, and branch points (`switch_branch` follows the curve that crosses there); of a
     conservative mode limit points (LP), where the energy turns, and period doublings (PD) as well. The curves of its
     LP, BP and extrema of omega over a second parameter (`track`) are read in the same way.

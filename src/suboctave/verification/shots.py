@@ -18,7 +18,7 @@ from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.basis import ComplexArray, HarmonicBasis
 from suboctave.harmonic.condensed import linear_part_of
-from suboctave.harmonic.energy import damping_ratio, fed
+from suboctave.harmonic.energy import damping_ratio
 from suboctave.harmonic.evaluation import HarmonicBalance
 from suboctave.harmonic.linear_part import StructuralMatrices
 from suboctave.harmonic.orbit import PeriodicOrbit
@@ -29,9 +29,6 @@ from suboctave.results.modes import ModeCurve
 from suboctave.timedomain import shoot
 from suboctave.timedomain.multiple_shooting import MultipleShooting, ShotMotions
 from suboctave.verification.motions import distance_of, largest_of
-
-#: corrections of an artificial damping, each of which leaves its share of the one before
-_CORRECTIONS = 4
 
 
 @dataclass(frozen=True)
@@ -160,15 +157,11 @@ def kept_going(orbits: Sequence[PeriodicOrbit], rate: str) -> list[PeriodicOrbit
         linear = linear_part_of(system, None, float(highest))
     found = []
     for orbit in orbits:
-        state, zeta = orbit.state(), 0.0
-        for _ in range(_CORRECTIONS):
-            # of a condensed structure it moves what is eliminated, too
-            zeta += damping_ratio(fed(state, zeta))
-        values = {**orbit.values, rate: 2.0 * zeta * orbit.omega}
+        values = {**orbit.values, rate: 2.0 * damping_ratio(orbit.state()) * orbit.omega}
         if orbit.basis not in balances:
             own = HarmonicBalance(system, orbit.basis, linear=linear)
             balances[orbit.basis] = own.settle(orbit.x, orbit.omega, values)
-        found.append(replace(orbit, balance=balances[orbit.basis], values=values))
+        found.append(replace(orbit, balance=balances[orbit.basis], values=values, zeta=0.0))
     return found
 
 

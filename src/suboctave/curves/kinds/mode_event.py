@@ -99,8 +99,8 @@ class ModeEvent(Augmentation):
     def multiplier(self, rate: float, extra: Array) -> complex | None:
         return self.base.multiplier(rate, extra)
 
-    def kept_going(self, state: BalanceState, extra: Array) -> BalanceState:
-        return self.base.kept_going(state, extra)
+    def zeta(self, extra: Array) -> float:
+        return self.base.zeta(extra)
 
     def unfolding(self, extra: Array) -> float:
         return float(extra[1]) if self.event == "BP" else 0.0
@@ -217,7 +217,7 @@ class ModeEventEquations(Equations):
         extra = self.extra.copy()
         extra[0] += by[n]
         moved = state.balance.at(state.x + state.balance.shaped(by[:n]), state.omega + by[-1], values)
-        return of.at(of.kept_going(moved, extra), extra, self.names)
+        return of.at(fed(moved, of.zeta(extra)), extra, self.names)
 
     def jacobian(self, names: tuple[str, ...]) -> Array:
         own, n = self.base.jacobian(names), self.state.balance.dimension

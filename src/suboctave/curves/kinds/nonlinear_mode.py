@@ -20,7 +20,7 @@ from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.curves.kinds.limit_cycle import CycleEquations, LimitCycle
 from suboctave.harmonic.assembly import apply_blocks
 from suboctave.harmonic.basis import Array
-from suboctave.harmonic.energy import damping_ratio, fed
+from suboctave.harmonic.energy import damping_ratio
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.lazy import lazy
 
@@ -61,8 +61,8 @@ class NonlinearMode(LimitCycle):
         """See `Augmentation.no_multipliers`."""
         return "" if self.conservative else "a damped mode is the motion of no system that stands by itself"
 
-    def kept_going(self, state: BalanceState, extra: Array) -> BalanceState:
-        return fed(state, float(extra[0]))
+    def zeta(self, extra: Array) -> float:
+        return float(extra[0])
 
     def at(self, state: BalanceState, extra: Array, names: tuple[str, ...]) -> ModeEquations:
         return ModeEquations(self, state, float(extra[0]), names)
