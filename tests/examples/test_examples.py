@@ -19,7 +19,16 @@ def test_there_are_examples():
 
 
 #: longer than the others, each on a subject that has tests of its own
-LONG = ("ex21_damping_against_isolas", "ex22_regimes", "ex23_chaos", "ex31_isola_under_tolerances")
+LONG = (
+    "ex16_isola",
+    "ex17_isolas_as_published",
+    "ex21_damping_against_isolas",
+    "ex22_regimes",
+    "ex23_chaos",
+    "ex24_basins",
+    "ex27_how_far_from_an_isola",
+    "ex31_isola_under_tolerances",
+)
 
 
 #: what some need beside the package: parts of the extra `fe`

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.optimize import fsolve
+from slow import slow
 
 import suboctave as so
 from suboctave import interruption
@@ -165,9 +166,7 @@ def damped_ends():
     return [(w, load(w, a)) for w, a in roots]
 
 
-@pytest.mark.parametrize(
-    "bounds", [(0.005, 0.06), (0.02, 0.06), pytest.param((0.005, 0.03), marks=pytest.mark.slow), (0.02, 0.03)]
-)
+@pytest.mark.parametrize("bounds", [(0.005, 0.06), *slow((0.02, 0.06), (0.005, 0.03)), (0.02, 0.03)])
 def test_an_isola_of_nonlinear_damping(damped, bounds):
     """Also where it meets no other branch within the bounds: stronger loads lead to it."""
     (isola,) = so.find_isolas(damped, (0.3, 2.0), "F", bounds, harmonics=1)
@@ -212,6 +211,7 @@ def test_a_third_of_the_frequency_is_searched_for():
     assert folds == pytest.approx([3.081375, 7.310848], abs=2e-6)
 
 
+@pytest.mark.slow
 def test_ends_can_be_tracked_again(isolas):
     curve = so.track(isolas[0].born, "p", (0.5, 0.6))
     assert set(curve.isola) == {"isola_centre"}
@@ -332,7 +332,7 @@ def between_stops():
     ("system", "omega", "bounds", "harmonics"),
     [
         (hardening(), (0.5, 1.2), (0.5, 3.0), "adaptive"),
-        (so.library.duffing(c=0.2), (0.5, 3.0), (0.5, 10.0), 9),
+        pytest.param(so.library.duffing(c=0.2), (0.5, 3.0), (0.5, 10.0), 9, marks=pytest.mark.slow),
         (chain(), (0.4, 2.5), (0.5, 8.0), 5),
         pytest.param(between_stops(), (0.4, 2.5), (0.5, 6.0), "adaptive", marks=pytest.mark.slow),
         pytest.param(so.library.duffing(c=0.2), (0.5, 3.0), (0.5, 30.0), "adaptive", marks=pytest.mark.slow),

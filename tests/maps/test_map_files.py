@@ -18,7 +18,7 @@ def regimes():
         loads=[so.HarmonicLoad(dof=0, amplitude="F")],
         parameters={"c": 0.08, "alpha": 0.5, "F": 0.3},
     )
-    return so.regime_map(system, (2.0, 0.6), "F", (0.5, 0.02), harmonics=1, depth=0)
+    return so.regime_map(system, (1.7, 0.9), "F", (0.35, 0.08), harmonics=1, depth=0, values=2)
 
 
 @pytest.fixture(scope="module")

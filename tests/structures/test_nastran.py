@@ -1,89 +1,15 @@
-"""Matrices of Nastran: OUTPUT4 by pyNastran, where that is installed, and punched DMIG entries."""
+"""Matrices of Nastran, punched as DMIG entries."""
 
 from __future__ import annotations
 
-import builtins
-import struct
-
 import numpy as np
 import pytest
-import scipy.sparse
 
 import suboctave as so
 
 DIRECTION = {"x": 1, "z": 3}
 
 
-def record(*parts: bytes) -> bytes:
-    """A record of Fortran: its length before and after it."""
-    data = b"".join(parts)
-    return struct.pack("<i", len(data)) + data + struct.pack("<i", len(data))
-
-
-def binary_output4(matrices) -> bytes:
-    """Dense columns in double precision, each from its first row to its last, and a column beyond the last."""
-    data = b""
-    for name, matrix in matrices.items():
-        n = len(matrix)
-        data += record(struct.pack("<4i", n, n, 6, 2), f"{name:<8}".encode())
-        for j in range(n):
-            rows = np.flatnonzero(matrix[:, j])
-            entries = matrix[rows[0] : rows[-1] + 1, j]
-            data += record(struct.pack("<3i", j + 1, rows[0] + 1, 2 * len(entries)), entries.tobytes())
-        data += record(struct.pack("<3id", n + 1, 1, 2, 1.0))
-    return data
-
-
-@pytest.mark.parametrize("form", ["binary", "dense", "sparse"])
-def test_output4(form, tmp_path, chain):
-    op4 = pytest.importorskip("pyNastran.op4.op4")
-    path = tmp_path / "job.op4"
-    matrices = {"KAA": chain.stiffness, "MAA": chain.mass, "K4AA": chain.stiffness}
-    if form == "binary":
-        path.write_bytes(binary_output4(matrices))
-    else:
-        kind = scipy.sparse.coo_matrix if form == "sparse" else np.asarray
-        written = {name: (6, kind(matrix)) for name, matrix in matrices.items()}
-        op4.OP4(debug=None).write_op4(str(path), written, is_binary=False)
-    structure = so.read_structure(path, dofs=chain.labels)
-    np.testing.assert_allclose(structure.stiffness.toarray(), chain.stiffness)
-    np.testing.assert_allclose(structure.mass.toarray(), chain.mass)
-    assert structure.damping is None
-    data = path.read_bytes()
-    for share in (0.1, 0.5, 0.9):
-        path.write_bytes(data[: int(share * len(data))])
-        with pytest.raises(so.InputError, match=r"job\.op4") as caught:
-            so.read_structure(path)
-        assert "\n" not in str(caught.value)
-
-
-def test_output2_that_is_none(tmp_path, capfd):
-    pytest.importorskip("pyNastran.op4.op4")
-    for data in (b"certainly no matrix", bytes(200), b""):
-        (tmp_path / "job.op2").write_bytes(data)
-        with pytest.raises(so.InputError, match=r"job\.op2") as caught:
-            so.read_structure(tmp_path / "job.op2")
-        assert "\n" not in str(caught.value)
-    assert not capfd.readouterr().out
-
-
-def test_without_pynastran_the_message_says_what_to_install(tmp_path, monkeypatch):
-    ordinary = builtins.__import__
-
-    def missing(name, *rest):
-        if name.startswith("pyNastran"):
-            raise ModuleNotFoundError(f"No module named {name!r}")
-        return ordinary(name, *rest)
-
-    monkeypatch.setattr(builtins, "__import__", missing)
-    for suffix in (".op4", ".op2"):
-        (tmp_path / f"job{suffix}").write_bytes(b"abc")
-        with pytest.raises(so.InputError, match=r"pip install suboctave\[fe\]"):
-            so.read_structure(tmp_path / f"job{suffix}")
-    assert hasattr(np, "in1d") == hasattr(np, "trapz")  # what was added for the import is gone again
-
-
-# ------------------------------------------------------------------------------------------------------------- punched
 def wide(name, matrix, labels):
     """As Nastran punches: sixteen columns a field, exponents with D, the lower triangle by columns."""
     lines = [f"DMIG    {name:<8}{0:>8}{6:>8}{2:>8}{0:>8}{'':>8}{'':>8}{matrix.shape[0]:>8}"]

@@ -155,20 +155,18 @@ def test_a_finished_search_is_kept_by_the_journal(ran, tmp_path):
     assert (item.state, item.branches) == ("finished", 1 + len(result[0].known))
 
 
-def test_resume_does_not_search_again(study_file, monkeypatch):
-    study = read_study(study_file(SYSTEM + ISOLAS + LATER.split("[[")[0]))
-    folder = study.folder
-    first = run_study(study)
-    journal = folder / JOURNAL
+def test_resume_does_not_search_again(ran, study_file, monkeypatch):
+    study = read_study(study_file(SYSTEM + ISOLAS))
+    result = ran[0].finished[0].result
     # as if it had been killed before the results were written
-    held = Journal.create(journal)
-    Noting(held, "isolas", study.keys[study.steps[0].name]).finish(first.finished[0].result, 1.0)
+    study.folder.mkdir()
+    held = Journal.create(study.folder / JOURNAL)
+    Noting(held, "isolas", study.keys[study.steps[0].name]).finish(result, 1.0)
     held.close()
-    (folder / "results.nc").unlink()
     monkeypatch.setattr(FindIsolas, "run", None)
     again = run_study(study, resume=True)
     assert again.finished[0].reused
-    assert repr(again.finished[0].result) == repr(first.finished[0].result)
+    assert repr(again.finished[0].result) == repr(result)
 
 
 @pytest.mark.parametrize(

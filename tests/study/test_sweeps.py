@@ -180,7 +180,7 @@ def test_a_list_of_points_is_what_the_grid_holds_there_and_each_failure_stays_it
         return {"half": 1 / 0} if results["response"].system.parameters["F"] == 0.1 else {}
 
     points = [{"F": float(grid["F"][i]), "c": c, "alpha": a} for i, c, a in ((3, 0.3, 1), (0, 0.1, 1), (0, 0.1, 1e308))]
-    listed = so.sweep(study, points, workers=2, measure=gentle)
+    listed = so.sweep(study, points, workers=1, measure=gentle)
     assert listed.dataset["response.points"].dims == ("point",)
     assert list(listed.failures) == [1, 2]
     assert listed.failures[1] == "ZeroDivisionError: division by zero"
@@ -470,6 +470,7 @@ def test_wrong_options_are_refused(study_file, suboctave, options, words):
     assert not out
 
 
+@pytest.mark.slow
 def test_the_page_prints_what_it_says(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "study.toml").write_text(blocks("sweeps.md", "toml")[0])

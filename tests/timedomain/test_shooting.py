@@ -106,7 +106,7 @@ REFERENCE = [
 
 
 #: the sharp arctan law takes longest to integrate
-SHARP = [row for row in REFERENCE if row[0] and row[4] == "LP" and row[1] == 0.55]
+SHARP = [row for row in REFERENCE if row[0] and row[4] == "LP"]
 
 
 @pytest.mark.parametrize(
@@ -124,7 +124,9 @@ def test_reference_bifurcations(s, p, j, periods, kind, start, state, omega, amp
         assert found.amplitude == pytest.approx(amplitude, abs=6e-8)
 
 
-@pytest.mark.parametrize(("start", "omega", "from_omega"), [(1.11, 1.1096, 0.9), (1.196, 1.1956, 0.9)])
+@pytest.mark.parametrize(
+    ("start", "omega", "from_omega"), [(1.11, 1.1096, 0.9), pytest.param(1.196, 1.1956, 0.9, marks=pytest.mark.slow)]
+)
 def test_neimark_sacker_of_the_nltva(start, omega, from_omega):
     """Detroux et al.'s absorber at F = 0.11; positions from harmonic balance, which agrees for H = 5, 7, 9."""
     system = so.library.nltva(F=0.11)

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from suboctave.errors import InputError, located, path_of, shortened, suggest
-from suboctave.structures import abaqus, calculix, hdf5, matlab, matrix_market, nastran, numpy_files
+from suboctave.structures import abaqus, calculix, hdf5, matlab, matrix_market, nastran, numpy_files, output2, output4
 from suboctave.structures.contents import Contents, chosen, matrix_of
 from suboctave.structures.dof_map import DofMap, direction_label, node_label
 from suboctave.structures.mesh import Mesh
@@ -29,8 +29,8 @@ _READERS: dict[str, tuple[str, Callable[[Path], Contents]]] = {
     ".mat": ("a MATLAB file", matlab.read_matlab),
     ".h5": ("an HDF5 file", hdf5.read_hdf5),
     ".hdf5": ("an HDF5 file", hdf5.read_hdf5),
-    ".op4": ("a Nastran OUTPUT4 file", nastran.read_op4),
-    ".op2": ("a Nastran OUTPUT2 file", nastran.read_op2),
+    ".op4": ("a Nastran OUTPUT4 file", output4.read_op4),
+    ".op2": ("a Nastran OUTPUT2 file", output2.read_op2),
     ".pch": ("a Nastran punch file", nastran.read_punch),
     ".sti": ("matrices of CalculiX", calculix.read_calculix),
     ".mas": ("matrices of CalculiX", calculix.read_calculix),

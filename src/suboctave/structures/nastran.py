@@ -1,85 +1,24 @@
-"""Nastran's .op4 and .op2 by pyNastran, and .pch, matrices punched as DMIG entries.
+"""Nastran's .pch, matrices punched as DMIG entries.
 
-.op4 and most .op2 know no labels: those are given with `dofs=`. Entries of DMIG carry node and component; fields are 8
-or, with an asterisk, 16 wide. MSC Nastran Quick Reference Guide, "DMIG".
+They carry node and component; fields are 8 or, with an asterisk, 16 wide. MSC Nastran Quick Reference Guide, "DMIG".
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
-from contextlib import contextmanager, redirect_stdout
-from io import StringIO
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from suboctave.errors import InputError
 from suboctave.structures.contents import Contents
-from suboctave.structures.text_lines import text_of
+from suboctave.structures.text_lines import fortran_number, text_of
 from suboctave.structures.triplets import LabelledEntries
 
 #: forms of a matrix in DMIG headers: square, symmetric
 _FORMS = {1, 6}
-_GONE = "in1d"
 
 
-def read_op4(path: Path) -> Contents:
-    """All matrices of an .op4 file, text or binary."""
-    with _py_nastran():
-        from pyNastran.op4.op4 import OP4
-    with redirect_stdout(StringIO()):  # what it prints of damaged files
-        matrices = OP4(debug=None).read_op4(str(path))
-    if not matrices:
-        raise InputError(f"{path.name} holds no matrix")
-    return Contents({name: _whole(matrix) for name, matrix in matrices.items()})
-
-
-def read_op2(path: Path) -> Contents:
-    """All matrices of an .op2 file, but for those of MATPOOL, whose labels pyNastran mixes up."""
-    with _py_nastran():
-        from pyNastran.op2.op2 import OP2
-    model = OP2(debug=None)
-    with redirect_stdout(StringIO()):
-        model.read_op2(str(path), combine=False)
-    matrices = {name: _whole(matrix) for name, matrix in model.matrices.items() if not matrix.is_matpool}
-    if not matrices:
-        raise InputError(
-            f"{path.name} holds no matrix such as KGG; write them to .op4, or punch them (EXTOUT, DMIGPCH)"
-        )
-    return Contents(matrices)
-
-
-@contextmanager
-def _py_nastran() -> Iterator[None]:
-    """Within it pyNastran is imported: version 1.4 asks NumPy for a name that went with NumPy 2.4."""
-    added = not hasattr(np, _GONE)
-    if added:
-        setattr(np, _GONE, np.isin)
-    try:
-        yield
-    except ImportError as error:
-        raise InputError(f"Nastran's binary files need pyNastran: pip install suboctave[fe] ({error})") from None
-    finally:
-        if added:
-            delattr(np, _GONE)
-
-
-def _whole(matrix: Any) -> Any:
-    """The matrix of pyNastran's, a triangle made whole where it says that it is symmetric."""
-    data = matrix.data
-    if matrix.form == 6 and hasattr(data, "tocsr"):
-        import scipy.sparse
-
-        rows = scipy.sparse.csr_array(data)
-        lower, upper = scipy.sparse.tril(rows, -1), scipy.sparse.triu(rows, 1)
-        if bool(lower.nnz) != bool(upper.nnz):
-            return rows + (lower + upper).T
-    return data
-
-
-# ------------------------------------------------------------------------------------------------------------- punched
 def read_punch(path: Path) -> Contents:
     """All matrices of a .pch file, with node and component of their rows."""
     entries: dict[str, list[tuple[int, int, int, int, float]]] = {}
@@ -143,9 +82,4 @@ def _groups(fields: list[str]) -> Iterator[tuple[int, int, float]]:
     for start in range(0, len(fields) - 2, 4):
         node, component, value = fields[start : start + 3]
         if node:
-            yield int(node), int(component or 0), _number(value)
-
-
-def _number(text: str) -> float:
-    """A number of Nastran: 1.5-3 and 1.5D-3 are 1.5E-3."""
-    return float(re.sub(r"(?<=[\d.])([+-]\d+)$", r"E\1", text.upper().replace("D", "E")))
+            yield int(node), int(component or 0), fortran_number(value)

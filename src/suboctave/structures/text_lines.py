@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import io
+import re
 from pathlib import Path
 
 import numpy as np
@@ -49,3 +50,8 @@ def whole(numbers: Array, file: str) -> np.ndarray:
     if not np.isfinite(numbers).all() or np.any(numbers != np.round(numbers)) or np.any(np.abs(numbers) > 2**52):
         raise InputError(f"{file}: nodes, directions, rows and columns must be whole numbers")
     return numbers.astype(np.int64)
+
+
+def fortran_number(text: str) -> float:
+    """A number as Fortran writes it: 1.5D-3 and 1.5-3 are 1.5E-3."""
+    return float(re.sub(r"(?<=[\d.])([+-]\d+)$", r"E\1", text.strip().upper().replace("D", "E")))

@@ -522,10 +522,10 @@ def _sizes(regimes: RegimeMap) -> tuple[Array, Array]:
     first, last = regimes.omega
     for omega in np.geomspace(first / 3.0, 3.0 * last, 97):
         try:
-            rows = curve.balance.shaped(linear_response(curve, float(omega))[:-1])
+            x, _, values = curve.split(linear_response(curve, float(omega)))
         except (ConvergenceError, np.linalg.LinAlgError):
             continue
-        size = np.hypot(rows[1], rows[2])
+        size = np.abs(PeriodicOrbit(curve.balance, x, float(omega), values, 0.0).amplitudes[1])
         if np.isfinite(size).all():
             top = np.maximum(top, np.concatenate((size, omega * size)))
     return known.min(axis=0), np.minimum(top, _CAP * known.max(axis=0))
