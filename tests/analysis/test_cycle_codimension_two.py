@@ -71,3 +71,67 @@ def test_a_fold_flip():
     mu = multipliers(event)
     assert np.sort(np.abs(mu - 1.0))[1] < 1e-4
     assert np.abs(mu + 1.0).min() < 1e-5
+
+
+# ------------------------------------------------------------------------------------------------------- normal forms
+def pumped(g):
+    """x shakes the stiffness of y at twice its frequency, y acts on x, and x by its square on its own frequency."""
+    first = "x'' + (x**2 - mu)*x' + x + 0.05*y**2 + 0.1*x**2 = 0"
+    second = "y'' + 0.1*y' + (0.27 + 0.4*x)*y + g*y**3 + 0.3*y**2 = 0"
+    system = so.System.from_equations([first, second], {"mu": 0.0, "g": g})
+    hopf = so.equilibria(system, "mu", (-0.1, 0.3)).bifurcations["Hopf"][0]
+    (doubling,) = so.limit_cycles(hopf, (-0.01, 0.03)).bifurcations["PD"]
+    return doubling
+
+
+def measured_curvature(doubling):
+    """Of the doubled branch: mu over the square of its half-odd part, in units of the null vector."""
+    phi = doubling.null_vectors.right * doubling.orbit.state().balance.row_weights(len(doubling.null_vectors.right))
+    branch = so.switch_branch(doubling, 1)
+    found = []
+    for orbit in branch.orbits[1:3]:
+        odd = range(1, orbit.basis.harmonics + 1, 2)
+        half = np.concatenate([orbit.x[2 * k - 1 : 2 * k + 1].ravel() for k in odd])
+        common = min(len(half), len(phi))
+        size = np.linalg.norm(half[:common]) / np.linalg.norm(phi[:common])
+        found.append((orbit.values["mu"] - doubling.parameters["mu"]) / size**2)
+    return found[0]
+
+
+@pytest.fixture(scope="module")
+def soft():
+    return pumped(-0.3)
+
+
+def test_the_criticality_of_period_doublings(soft):
+    assert soft.criticality == "subcritical"
+    assert soft.normal_form["curvature"] == pytest.approx(measured_curvature(soft), rel=5e-3)
+
+
+def test_a_generalised_period_doubling(soft):
+    curve = so.track(soft, "g", (-0.35, 0.35))
+    (event,) = curve.bifurcations["GPD"]
+    np.testing.assert_array_equal(curve.coefficient > 0.0, curve.parameter("g") < event.parameters["g"])
+    # between the two sides, on curves of cycles computed there
+    sides = [pumped(event.parameters["g"] + s) for s in (-0.02, 0.02)]
+    assert [side.criticality for side in sides] == ["subcritical", "supercritical"]
+    values = [side.normal_form["curvature"] for side in sides]
+    assert abs(sum(values)) < 0.05 * abs(values[1])
+    assert values[1] == pytest.approx(measured_curvature(sides[1]), rel=2e-2)
+
+
+@pytest.mark.parametrize(("back", "expected"), [(0.0, -1.0 / 6.4), (0.5, 0.15 / 1.6)])
+def test_the_criticality_of_tori_by_averaging(back, expected):
+    """A' = A (mu - A^2 / 4 - back B^2 / 2) / 2, B' = B (m - 0.4 A^2 - B^2 / 4) / 2: mu runs as B^2 along the tori."""
+    system = so.System.from_equations(
+        ["x'' + (x**2 + back*y**2 - mu)*x' + x = 0", "y'' + (y**2 + 0.8*x**2 - m)*y' + 2.6*y = 0"],
+        {"mu": 0.0, "m": 0.02, "back": back},
+    )
+    hopf = so.equilibria(system, "mu", (-0.1, 0.1)).bifurcations["Hopf"]
+    first = min(hopf, key=lambda item: abs(item.parameters["mu"]))
+    (torus,) = so.limit_cycles(first, (0.0, 0.03), harmonics=5).bifurcations["NS"]
+    assert torus.criticality == ("supercritical" if expected < 0.0 else "subcritical")
+    phi = torus.null_vectors.right * torus.orbit.state().balance.row_weights(len(torus.null_vectors.right))
+    # of A phi and its conjugate
+    size = 2.0 * np.abs(phi.reshape(-1, torus.orbit.balance.size)[:, 1]).max()
+    assert torus.normal_form["curvature"] == pytest.approx(expected * size**2, rel=2e-2)

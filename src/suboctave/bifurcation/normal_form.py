@@ -39,6 +39,9 @@ and what remains at kappa is, with `i g = i psi^H dJ_kappa/dkappa phi`,
 The real part of c3 is the first Lyapunov coefficient: negative, a stable torus surrounds the motions that have lost
 stability (supercritical), with `|A|^2 = -Re d delta / Re c3`. Near `kappa = w0 / 3` and `w0 / 4` resonant terms of
 second and third order join; at those ratios the form says nothing.
+
+Of limit cycles J_0 is singular by the free phase, and omega an unknown: solutions with J_0 are those of `[J_0 R_omega;
+phase condition]`, with a change of omega that moves `psi.J phi` as well.
 """
 
 from __future__ import annotations
@@ -51,7 +54,7 @@ from functools import cached_property
 import numpy as np
 
 from suboctave.bifurcation.bordered import NullVectors, bordered, null_vectors
-from suboctave.continuation.linear import Factor, LeadingBlock
+from suboctave.continuation.linear import Factor, length
 from suboctave.errors import ConvergenceError, InputError, suggest
 from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.derivatives import Direction, Multilinear, second_derivative
@@ -140,8 +143,8 @@ def unweighted(state: BalanceState, vector: np.ndarray) -> np.ndarray:
 class Expansion:
     """Null vectors of an operator at a motion in the coefficients' own units, psi turned so that g > 0.
 
-    `by_parameter` is `psi.J_p phi`, `by_motion` the gradient of `psi.J phi` by the motion, (2 H + 1, size); `g_size`
-    the sum of the moduli that g is made of.
+    `by_parameter` is `psi.J_p phi`, `by_omega` the same by omega, `by_motion` the gradient of `psi.J phi` by the
+    motion, (2 H + 1, size); `g_size` the sum of the moduli that g is made of.
     """
 
     state: BalanceState
@@ -152,38 +155,40 @@ class Expansion:
     g_size: float
     by_motion: Array
     by_parameter: float
+    by_omega: float
     forms: Multilinear
 
     @classmethod
     def of(cls, state: BalanceState, kind: Kind, vectors: NullVectors, name: str) -> Expansion:
         """For one of the two real operators."""
         phi, psi = unweighted(state, vectors.right), unweighted(state, vectors.left)
-        slope = bilinear_gradient(state, kind, psi, phi, (name,))
+        slope = bilinear_gradient(state, kind, psi, phi, (name, "omega"))
         g, size = float((1j * slope.kappa).real), _growth_size(state, kind, psi, phi)
         # without damping g is rounding, and the parameter tells the sense
         certain = abs(g) > _ROUNDING * size
         turn = -1.0 if (g if certain else slope.rates[name].real) < 0.0 else 1.0
-        by_parameter = turn * slope.rates[name].real
-        return cls(state, kind, phi, turn * psi, turn * g, size, turn * slope.x, by_parameter, Multilinear(state))
+        by_parameter, by_omega = (turn * slope.rates[one].real for one in (name, "omega"))
+        forms = Multilinear(state)
+        return cls(state, kind, phi, turn * psi, turn * g, size, turn * slope.x, by_parameter, by_omega, forms)
 
     @cached_property
     def waves(self) -> Waves:
         """phi as waves."""
         return Waves.of(self.state, self.kind, self.phi)
 
-    def growth(self, along: Array) -> float:
-        """d, from the change of the motion along its branch, (2 H + 1, size)."""
-        return self.by_parameter + float((self.by_motion * along).sum())
+    def growth(self, along: Array, omega: float = 0.0) -> float:
+        """d, from the change of the motion along its branch, (2 H + 1, size), and that of a free omega."""
+        return self.by_parameter + float((self.by_motion * along).sum()) + self.by_omega * omega
 
     def squared(self) -> Array:
         """R''[phi, phi], shape (dimension,)."""
         phi = self.waves
         return self.forms.second(phi, phi, Frequencies.of(self.state, Kind.INTEGER)).vector(Kind.INTEGER)
 
-    def cubic(self, second: Array) -> tuple[float, float]:
-        """c3 from X2 (dimension,), and the size of its two terms."""
+    def cubic(self, second: Array, omega: float = 0.0) -> tuple[float, float]:
+        """c3 from X2 (dimension,) and the change of a free omega, and the size of its two terms."""
         phi = self.waves
-        mixed = float((self.by_motion * second.reshape(self.by_motion.shape)).sum())
+        mixed = float((self.by_motion * second.reshape(self.by_motion.shape)).sum()) + self.by_omega * omega
         third = self.forms.third(phi, phi, phi, Frequencies.of(self.state, self.kind)).vector(self.kind)
         pure = float(self.psi @ third) / 6.0
         return mixed + pure, abs(mixed) + abs(pure)
@@ -201,6 +206,26 @@ def _ratio(over: float, under: float) -> float:
     return over / under if under else math.nan
 
 
+def responding(state: BalanceState) -> Callable[[Array], tuple[Array, float]]:
+    """Solves `J_0 X = rhs` for (dimension,), of limit cycles at their phase, with a change of omega."""
+    if state.driven or not np.any(state.x[1:]):
+        plain = Factor.of(state.jacobian)
+        return lambda rhs: (plain.solve(rhs), 0.0)
+    n = state.balance.dimension
+    scale = state.balance.row_weights(n)
+    turning = state.basis.derivative(state.x).ravel() / scale
+    matrix = np.zeros((n + 1, n + 1))
+    matrix[:n] = state.extended_jacobian("omega") * scale[:, None] * np.append(scale, state.omega)
+    matrix[n, :n] = state.omega**2 * turning / (length(turning) or 1.0)
+    factor = Factor.of(matrix)
+
+    def solve(rhs: Array) -> tuple[Array, float]:
+        solution = factor.solve(np.append(rhs * scale, 0.0))
+        return solution[:n] * scale, float(solution[n]) * state.omega
+
+    return solve
+
+
 def limit_point(state: BalanceState, vectors: NullVectors, name: str, kappa: float) -> Terms:
     """a, b, g and the curvature: along the branch `p = p_0 + curvature eps^2`."""
     own = Expansion.of(state, Kind.INTEGER, vectors, name)
@@ -211,23 +236,29 @@ def limit_point(state: BalanceState, vectors: NullVectors, name: str, kappa: flo
 def period_doubling(state: BalanceState, vectors: NullVectors, name: str, kappa: float) -> Terms:
     """c3, d, g and the curvature."""
     own = Expansion.of(state, Kind.HALF, vectors, name)
-    factor = Factor.of(state.jacobian)
-    c3, size = own.cubic(factor.solve(-0.5 * own.squared()))
-    d = own.growth(factor.solve(-state.residual_by(name)).reshape(state.x.shape))
+    solve = responding(state)
+    c3, size = own.cubic(*solve(-0.5 * own.squared()))
+    along, omega = solve(-state.residual_by(name))
+    d = own.growth(along.reshape(state.x.shape), omega)
     coefficients = {"c3": c3, "d": d, "g": own.g, "curvature": _ratio(-c3, d)}
     return Terms(coefficients, {"c3": size, "g": own.g_size}, own.g_size)
 
 
 def cubic_coefficient(
-    state: BalanceState, phi: Array, psi: Array, by_motion: Array, block: LeadingBlock, weights: Array
+    state: BalanceState,
+    phi: Array,
+    psi: Array,
+    by_motion: Array,
+    by_omega: float,
+    solve: Callable[[Array], tuple[Array, float]],
 ) -> float:
     """c3 of a period doubling along curves of them, where `psi.R''[phi, .]` is known: it is the gradient of g.
 
     `phi`, `psi`: null vectors of J_half in the coefficients' own units; `by_motion`: gradient of `psi.J_half phi` by
-    the motion, (2 H + 1, size); `block`: J_0, its columns divided by `weights`, one for every coefficient.
+    the motion, (2 H + 1, size), and omega; `solve`: see `responding`.
     """
-    own = Expansion(state, Kind.HALF, phi, psi, 0.0, 0.0, by_motion, 0.0, Multilinear(state))
-    return own.cubic(block.solve(-0.5 * own.squared()) / weights)[0]
+    own = Expansion(state, Kind.HALF, phi, psi, 0.0, 0.0, by_motion, 0.0, by_omega, Multilinear(state))
+    return own.cubic(*solve(-0.5 * own.squared()))[0]
 
 
 #: share of its terms' size below which c counts as zero: a branch point is located to about 1e-8 of its symmetry
@@ -275,22 +306,22 @@ _STATED, _RESONANT = 0.02, 1e-3
 def torus(state: BalanceState, vectors: NullVectors, name: str, kappa: float) -> Terms:
     """c3, d and the curvature; growth and frequency apart."""
     phi, psi = unweighted(state, vectors.right), unweighted(state, vectors.left)
-    slope = bilinear_gradient(state, Kind.FREE, psi, phi, (name,), kappa)
+    slope = bilinear_gradient(state, Kind.FREE, psi, phi, (name, "omega"), kappa)
     g = 1j * slope.kappa
     forms, wave = Multilinear(state), Waves.of(state, Kind.FREE, phi, kappa)
     whole, own = Frequencies.of(state, Kind.INTEGER), Frequencies.of(state, Kind.FREE, kappa)
     twice = Frequencies.of(state, Kind.FREE, 2.0 * kappa)
-    factor = Factor.of(state.jacobian)
-    along = factor.solve(-state.residual_by(name)).reshape(state.x.shape)
-    d = (slope.rates[name] + (slope.x * along).sum()) / g
-    mean = factor.solve(-forms.second(wave, wave.conjugate, whole).vector(Kind.INTEGER).real)
+    solve = responding(state)
+    along, omega = solve(-state.residual_by(name))
+    d = (slope.rates[name] + (slope.x * along.reshape(state.x.shape)).sum() + slope.rates["omega"] * omega) / g
+    mean, omega = solve(-forms.second(wave, wave.conjugate, whole).vector(Kind.INTEGER).real)
     second = Factor.of(operator(state, Kind.FREE, 2.0 * kappa)).solve(
         -0.5 * forms.second(wave, wave, twice).vector(Kind.FREE)
     )
     h20 = Waves(second.reshape(-1, state.balance.size), twice)
     parts = np.array(
         [
-            (slope.x * mean.reshape(state.x.shape)).sum(),
+            (slope.x * mean.reshape(state.x.shape)).sum() + slope.rates["omega"] * omega,
             np.vdot(psi, forms.second(wave.conjugate, h20, own).vector(Kind.FREE)),
             0.5 * np.vdot(psi, forms.third(wave, wave, wave.conjugate, own).vector(Kind.FREE)),
         ]

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from suboctave.bifurcation import measures
-from suboctave.bifurcation.bordered import NullVectors
+from suboctave.bifurcation.bordered import NullVectors, null_vectors
 from suboctave.bifurcation.gaps import GapExtrema, gap_extrema
-from suboctave.bifurcation.normal_form import cubic_coefficient
+from suboctave.bifurcation.normal_form import cubic_coefficient, responding
 from suboctave.continuation.linear import Factor, LeadingBlock, length
 from suboctave.continuation.point import CurvePoint
 from suboctave.curves.kinds.branch_point import BranchPointEquations
@@ -190,6 +190,15 @@ class Sample:
         border = getattr(self.evaluation.equations.own, "bordered", None)
         return None if border is None else border.vectors
 
+    def critical_vectors(self, operator: Kind) -> tuple[NullVectors, float]:
+        """Null vectors of another operator that is singular here, and kappa of the pair next to the unit circle."""
+        kappa = 0.0
+        if operator is Kind.FREE:
+            pairs = self.others[self.others.imag > 0.0]
+            pair = pairs[np.argmin(np.abs(np.abs(pairs) - 1.0))]
+            kappa = float(np.angle(pair)) * self.state.rate / (2.0 * np.pi)
+        return null_vectors(self.state, operator, kappa), kappa
+
     @lazy
     def bend(self) -> float:
         """psi . R''[phi, phi] of an LP."""
@@ -214,17 +223,21 @@ class Sample:
     @lazy
     def cubic(self) -> float:
         """c3 of a PD, see `bifurcation.normal_form`; psi is not turned, so that it is smooth along the curve."""
-        b, by_x = self.equations.bordered, self.equations.gradient[0].real
-        by_motion = -by_x.reshape(self.state.x.shape)
-        weights = self.point.weights[: self.state.x.size]
-        return cubic_coefficient(self.state, b.right, b.left, by_motion, self._plain, weights)
+        b, (by_x, rates, _) = self.equations.bordered, self.equations.gradient
+        free = self.curve.augmentation.free_phase
+        by_motion, by_omega = -by_x.real.reshape(self.state.x.shape), -rates["omega"].real if free else 0.0
+        solve = responding(self.state) if free else self._responding
+        return cubic_coefficient(self.state, b.right, b.left, by_motion, by_omega, solve)
+
+    def _responding(self, rhs: Array) -> tuple[Array, float]:
+        """See `normal_form.responding`: by the factors that the point was solved with."""
+        return self._plain.solve(rhs) / self.point.weights[: self.state.x.size], 0.0
 
     @lazy
     def coefficient(self) -> float:
         """What decides the normal form: psi . R''[phi, phi] / 2 of an LP, c3 of a PD, psi turned; nan for others."""
         augmentation = self.curve.augmentation.own
-        known = isinstance(augmentation, SingularOperator) and not augmentation.free_phase
-        kind = augmentation.kind if known and isinstance(augmentation, SingularOperator) else Kind.FREE
+        kind = augmentation.kind if isinstance(augmentation, SingularOperator) else Kind.FREE
         if kind is Kind.FREE:
             return float("nan")
         # gradients are those of -psi.J phi: `twist` is the g of normal forms, `bend` has the other sign
@@ -290,6 +303,11 @@ class Sample:
         if augmentation.free_phase and augmentation.own.name in ("PD", "NS"):
             mu = _without(mu, 1.0 + 0.0j, False)
         return _without(mu, critical, augmentation.name == "NS" or augmentation.trivial == 2)
+
+    @property
+    def fold(self) -> tuple[float, float]:
+        """Sign and logarithm of the determinant that vanishes where another multiplier is +1."""
+        return self.fold_of_cycles if self.curve.augmentation.free_phase else self.determinant(Kind.INTEGER)
 
     @lazy
     def fold_of_cycles(self) -> tuple[float, float]:

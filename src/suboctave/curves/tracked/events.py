@@ -25,7 +25,8 @@ from suboctave.continuation.problem import Array
 from suboctave.curves.interior import Interior, Steps, unsettled
 from suboctave.curves.kinds.extremum import LimitPointExtremal
 from suboctave.curves.kinds.grazing import GrazingEquations
-from suboctave.curves.kinds.singular import SingularOperator
+from suboctave.curves.kinds.limit_cycle import LimitCycle
+from suboctave.curves.kinds.singular import OPERATORS, SingularOperator
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.other_branch import crossing_point
 from suboctave.curves.sample import Sample
@@ -325,6 +326,9 @@ def as_event(event: LocatedEvent, method: StabilityMethod, observe: int) -> Trac
     curve, orbit = sample.curve, sample.orbit
     name = getattr(event.test, "name", curve.names[:2][-1])
     chord = event.chord() if isinstance(event.test, CurvesCross) else None
+    vectors, kappa = sample.vectors, sample.kappa
+    if curve.augmentation.name == LimitCycle.name and event.test.kind in ("PD", "NS"):
+        vectors, kappa = sample.critical_vectors(OPERATORS[event.test.kind])
     return TrackedEvent(
         event.test.kind,
         orbit,
@@ -332,8 +336,8 @@ def as_event(event: LocatedEvent, method: StabilityMethod, observe: int) -> Trac
         orbit.residual,
         orbit.amplitude(observe),
         name,
-        sample.vectors,
-        sample.kappa,
+        vectors,
+        kappa,
         arclength=sample.point.arclength,
         # a parameter changes by no more than its range along a unit of arclength
         uncertainty=event.off * curve.spans[curve.names.index(name)] if name in curve.names else 0.0,

@@ -251,11 +251,11 @@ class GeneralisedDoubling(CurveTest):
 
     def value(self, sample: Sample) -> float:
         # at a fold-flip c3 passes through infinity, and det J_0 through zero
-        return sample.cubic * sample.sign(Kind.INTEGER)
+        return sample.cubic * sample.fold[0]
 
     def smooth(self, sample: Sample) -> tuple[float, float]:
         sign, size = super().smooth(sample)
-        return sign, size + sample.determinant(Kind.INTEGER)[1]
+        return sign, size + sample.fold[1]
 
 
 @dataclass(frozen=True)
@@ -496,9 +496,9 @@ _OF_BIFURCATIONS: dict[Kind, tuple[CurveTest, ...]] = {
         PairCrossing("NSNS"),
     ),
 }
-#: the same of limit cycles; the criticality of their doublings is not known
+#: the same of limit cycles
 _OF_CYCLES: dict[Kind, tuple[CurveTest, ...]] = {
-    Kind.HALF: (DoubleMultiplier("R2"), FoldOfCycles("LPPD"), PairCrossing("PDNS")),
+    Kind.HALF: (GeneralisedDoubling(), DoubleMultiplier("R2"), FoldOfCycles("LPPD"), PairCrossing("PDNS")),
     Kind.FREE: (
         Resonance("R3", 3),
         Resonance("R4", 4),
