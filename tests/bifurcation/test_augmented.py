@@ -7,8 +7,8 @@ import pytest
 
 import suboctave as so
 from suboctave.bifurcation.bordered import null_vectors
-from suboctave.bifurcation.normal_form import Expansion, cubic_coefficient
-from suboctave.continuation.linear import Factor, LeadingBlock
+from suboctave.bifurcation.normal_form import Expansion, cubic_coefficient, responding
+from suboctave.continuation.linear import Factor
 from suboctave.curves.kinds.branch_point import BranchPointUnfolded
 from suboctave.curves.kinds.grazing import GrazingContactEquations
 from suboctave.curves.kinds.singular import SingularOperator
@@ -114,7 +114,6 @@ def test_cubic_coefficient_of_the_general_way(system):
     curve, u = curve_at(system, ("omega", "p"), "PD")
     state = curve.evaluate(u).state
     own = Expansion.of(state, Kind.HALF, null_vectors(state, Kind.HALF), "omega")
-    block = LeadingBlock(Factor.of(state.jacobian), len(state.jacobian))
-    expected = own.cubic(block.solve(-0.5 * own.squared()))[0]
-    found = cubic_coefficient(state, own.phi, own.psi, own.by_motion, block, np.ones(block.size))
+    expected = own.cubic(Factor.of(state.jacobian).solve(-0.5 * own.squared()))[0]
+    found = cubic_coefficient(state, own.phi, own.psi, own.by_motion, 0.0, responding(state))
     assert found == pytest.approx(expected, rel=1e-9)

@@ -41,11 +41,11 @@ def test_the_short_ways_are_the_general_one(state):
     b = bordered(state, Kind.HALF, null_vectors(state, Kind.HALF))
     by_motion = -b.gradient(())[0].reshape(state.x.shape)
     solve = Factor.of(state.jacobian).solve
-    general = Expansion(state, Kind.HALF, b.right, b.left, 0.0, 0.0, by_motion, 0.0, Multilinear(state))
+    general = Expansion(state, Kind.HALF, b.right, b.left, 0.0, 0.0, by_motion, 0.0, 0.0, Multilinear(state))
     expected, size = general.cubic(solve(-0.5 * general.squared()))
     weights = np.linspace(1.0, 2.0, len(state.jacobian))
     block = LeadingBlock(Factor.of(state.jacobian / weights), len(weights))
-    found = cubic_coefficient(state, b.right, b.left, by_motion, block, weights)
+    found = cubic_coefficient(state, b.right, b.left, by_motion, 0.0, lambda rhs: (block.solve(rhs) / weights, 0.0))
     assert found == pytest.approx(expected, abs=1e-12 * size)
 
 
