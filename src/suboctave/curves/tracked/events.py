@@ -464,13 +464,8 @@ class _Step(Interior):
     def measures(self, sample: Sample) -> Array:
         return self.steps.functions(sample)
 
-    def solved(self, fraction: float) -> Sample | None:
-        try:
-            sample = Sample(point_between(self.old.point, self.new.point, fraction, self.steps.newton))
-        except ConvergenceError:
-            return None
-        self.refused = self.strays(sample, fraction)
-        return None if self.refused else sample
+    def solve(self, fraction: float) -> Sample:
+        return Sample(point_between(self.old.point, self.new.point, fraction, self.steps.newton))
 
     def harmless(self, p: Sample, q: Sample, reason: str) -> bool:
         return reason not in self.reasons or self.steps.tests[self.reasons.index(reason)].changed(p, q)
