@@ -99,3 +99,26 @@ def test_a_border_with_three_corners_closes(systems: ModuleType) -> None:
     ]  # fmt: skip
     assert [kind for kind, _ in met] == [kind for kind, _ in known]
     assert [value for _, value in met] == pytest.approx([value for _, value in known], abs=1e-5)
+
+
+def test_a_step_whose_interior_has_no_solution_is_halved(systems: ModuleType) -> None:
+    """It leads over two corners with a loop between them; a turn that is not located in a corner is known as well as
+    the step is long.
+    """
+    description = systems.describe(506, strong=True)
+    load = description["loads"][0]["amplitude"]
+    description["loads"][0]["amplitude"] = "F"
+    response = so.frequency_response(systems.system_of(description, {"F": load}), (0.1959, 0.1962), harmonics=15)
+    known = [
+        ("GPD", "F", 1.7009182), ("GPD", "F", 1.7292643), ("extremum", "F", 1.6987441), ("extremum", "F", 1.7303259),
+        ("extremum", "F", 1.7303263), ("extremum", "F", 1.7322812), ("extremum", "F", 1.7323076),
+        ("extremum", "omega", 1.7007747), ("extremum", "omega", 1.7302932), ("extremum", "omega", 1.7303259),
+        ("extremum", "omega", 1.7323076), ("extremum", "omega", 1.7323122),
+    ]  # fmt: skip
+    for high in (1.01, 1.3):
+        border = so.track(response.bifurcations["PD"][0], "F", (0.4 * load, high * load))
+        met = sorted((event.kind, event.parameter_name, event.parameter("F")) for event in border.bifurcations)
+        met = [event for event in met if event[2] < load]
+        assert [event[:2] for event in met] == [event[:2] for event in known]
+        assert [event[2] for event in met] == pytest.approx([event[2] for event in known], abs=1e-6)
+        assert max(event.uncertainty for event in border.bifurcations) < 1e-6

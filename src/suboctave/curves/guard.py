@@ -31,7 +31,6 @@ from suboctave.curves.events.monitors import BRANCH_POINT, NEIMARK_SACKER, Locat
 from suboctave.curves.interior import FINEST, Interior, Steps, unsettled
 from suboctave.curves.sample import Sample
 from suboctave.curves.trace import Audit
-from suboctave.errors import ConvergenceError
 from suboctave.floquet.held import of_those_moved
 from suboctave.floquet.symmetric import in_rings
 
@@ -168,14 +167,8 @@ class GuardedStep(Interior):
                 share = at + math.copysign(2.0 * _CLEAR, 0.5 - at)
         return super().cut(p, q, share)
 
-    def solved(self, fraction: float) -> Sample | None:
-        try:
-            sample = self.steps.solve(self.old, self.new, fraction, bool(self.crossings or self.turned))
-        except ConvergenceError:
-            self.refused = self.size > _JUMP
-            return None
-        self.refused = self.strays(sample, fraction)
-        return None if self.refused else sample
+    def solve(self, fraction: float) -> Sample:
+        return self.steps.solve(self.old, self.new, fraction, bool(self.crossings or self.turned))
 
     def doubt(self, p: Sample, q: Sample) -> tuple[float, str] | None:
         """See `Interior.doubt`."""

@@ -33,6 +33,7 @@ from suboctave.curves.crossings import first_doubtful
 from suboctave.curves.events.grazings import height_gradient
 from suboctave.curves.sample import Sample
 from suboctave.curves.trace import Unsettled
+from suboctave.errors import ConvergenceError
 from suboctave.harmonic.trigonometric import passages
 
 __all__ = ["FINEST", "Interior", "Steps", "unsettled"]
@@ -219,12 +220,24 @@ class Interior(ABC):
         return ()
 
     @abstractmethod
-    def solved(self, fraction: float) -> Sample | None:
-        """The sample at a fraction of the step, None if there is none."""
+    def solve(self, fraction: float) -> Sample:
+        """The sample at a fraction of the step; may raise ConvergenceError."""
 
     @abstractmethod
     def harmless(self, p: Sample, q: Sample, reason: str) -> bool:
         """Whether an interval too short to be cut is done all the same."""
+
+    def solved(self, fraction: float) -> Sample | None:
+        """The sample at a fraction of the step; None, and the step is refused if it can be halved, where there is none
+        or it lies elsewhere than the ends say.
+        """
+        try:
+            sample = self.solve(fraction)
+        except ConvergenceError:
+            self.refused = self.size > FINEST
+            return None
+        self.refused = self.strays(sample, fraction)
+        return None if self.refused else sample
 
     def strays(self, sample: Sample, fraction: float) -> bool:
         """Whether the motion at a fraction of the step is not where the ends say: these lie on different curves."""

@@ -190,7 +190,9 @@ def events_between(
             item = located(test, a, b, newton) if test.changed(a, b) else None
             events += [] if item is None else [item]
         except ConvergenceError as failure:
-            warnings.append(f"{test.kind} near {b.where}: {failure}")
+            turn = _turned(test, a, b)
+            events += [] if turn is None else [turn]
+            warnings += [f"{test.kind} near {b.where}: {failure}"] if turn is None else []
     near = SAME * (samples[-1].place - samples[0].place)
     return sorted(_genuine(events, samples[-1].curve, near), key=lambda item: item.sample.place)
 
@@ -236,6 +238,16 @@ def located(test: CurveTest, low: Sample, high: Sample, newton: NewtonOptions) -
     )
 
 
+def _turned(test: CurveTest, a: Sample, b: Sample) -> LocatedEvent | None:
+    """The extremum of a parameter between two points that nothing could locate, as in a corner: where a parameter runs
+    the other way behind it there is one, smooth or not. None of a cusp's curve, where the function jumps in a corner.
+    """
+    if not isinstance(test, Extremum) or test.beside_cusps(a) or test.beside_cusps(b):
+        return None
+    nearest = min(a, b, key=lambda sample: abs(test.value(sample)))
+    return LocatedEvent(test, nearest, test.extreme(test.value(a), nearest), off=b.place - a.place, ends=(a, b))
+
+
 def _genuine(events: list[LocatedEvent], curve: MotionProblem, near: float) -> list[LocatedEvent]:
     """Events without those that others bring about.
 
@@ -271,7 +283,8 @@ def _finer(sample: Sample) -> HarmonicBasis | None:
 def refined(event: LocatedEvent, newton: NewtonOptions, warnings: list[str]) -> LocatedEvent:
     """An event located again with the harmonics that events ask for."""
     sample = event.sample
-    for _ in range(6):
+    # what could not be located is not found with more
+    for _ in range(6 if event.off == 0.0 else 0):
         curve, basis = sample.curve, _finer(sample)
         if basis is None:
             break
@@ -468,13 +481,8 @@ class _Step(Interior):
     def measures(self, sample: Sample) -> Array:
         return self.steps.functions(sample)
 
-    def solved(self, fraction: float) -> Sample | None:
-        try:
-            sample = Sample(point_between(self.old.point, self.new.point, fraction, self.steps.newton))
-        except ConvergenceError:
-            return None
-        self.refused = self.strays(sample, fraction)
-        return None if self.refused else sample
+    def solve(self, fraction: float) -> Sample:
+        return Sample(point_between(self.old.point, self.new.point, fraction, self.steps.newton))
 
     def harmless(self, p: Sample, q: Sample, reason: str) -> bool:
         return reason not in self.reasons or self.steps.tests[self.reasons.index(reason)].changed(p, q)

@@ -9,7 +9,7 @@ import numpy as np
 
 from suboctave.continuation import CurvePoint, March
 from suboctave.continuation.ending import Ending, EndReason
-from suboctave.continuation.linear import cosine, length
+from suboctave.continuation.linear import cosine, distance, length
 from suboctave.continuation.point import solved_again
 from suboctave.curves.follow import Driver
 from suboctave.curves.junction import keeps_subharmonics
@@ -41,9 +41,7 @@ _JUMP = 2e-6
 _GROWN = 1e4
 #: steps that need not come closer to the end of an NS curve
 _NEAR_END = 1e-3
-#: corners after which no further one is passed
-_CORNERS = 5
-#: way before a corner, in scaled arclength, on which what turns there is not told from it
+#: way before a corner, in scaled arclength, on which what turns there, or comes to it, is not told from it
 _CORNER = 1e-5
 #: distance of the multipliers from the critical one at which a point is doubtful; points in succession at which it is,
 #: beside multipliers so large that it cannot be told, after which a curve ends
@@ -74,7 +72,8 @@ class _Tracker(Driver):
         self.watch = StepWatch(self.tests, settings.newton)
         #: the end of the step that was looked at last
         self._candidate: Sample | None = None
-        self.corners = 0
+        #: points from which corners were passed
+        self.corners: list[CurvePoint] = []
         #: how many points have known multipliers, and where none of these is the critical one
         self.compared = 0
         self.doubtful: list[str] = []
@@ -110,9 +109,10 @@ class _Tracker(Driver):
     def _beyond_corner(self) -> CurvePoint | None:
         """A point behind a corner that the steps could not get around, None if there is none."""
         last = self.previous
-        if last is None or self.corners >= _CORNERS:
+        # once each way: a second time the curve has gone astray
+        if last is None or any(_same(last.point, known) for known in self.corners):
             return None
-        self.corners += 1
+        self.corners.append(last.point)
         before = (p.orbit for p in reversed(self.trace.points))
         corner = beyond_corner(last, before, self.settings.newton)
         if corner is None:
@@ -296,3 +296,9 @@ class _Tracker(Driver):
             return b
         chord = point.u - b.curve.transfer(a.point.u, a.curve)
         return Sample(replace(point, tangent=chord / length(point.weights * chord)))
+
+
+def _same(a: CurvePoint, b: CurvePoint) -> bool:
+    """Whether two points of a curve lie at one place and head the same way."""
+    other, heading = (a.curve.transfer(vector, b.curve) for vector in (b.u, b.tangent))
+    return distance(a.u, other, a.weights) < _CORNER and cosine(a.tangent, heading, a.weights) > 0.0

@@ -116,16 +116,16 @@ class Extremum(CurveTest):
 
     def value(self, sample: Sample) -> float:
         slope = sample.slopes[self.name]
-        return slope / sample.bend if self._beside_cusps(sample) else slope
+        return slope / sample.bend if self.beside_cusps(sample) else slope
 
     @staticmethod
-    def _beside_cusps(sample: Sample) -> bool:
+    def beside_cusps(sample: Sample) -> bool:
         """Whether both parameters turn where the cusp's function vanishes, which it does not do here."""
         augmentation = sample.curve.augmentation
         return augmentation.own.name == "LP" and not augmentation.turning and sample.bend != 0.0
 
     def extreme(self, before: float, at: Sample) -> str:
-        rising = before * at.bend if self._beside_cusps(at) else before
+        rising = before * at.bend if self.beside_cusps(at) else before
         return "maximum" if rising > 0.0 else "minimum"
 
     def changed(self, a: Sample, b: Sample) -> bool:
