@@ -38,45 +38,32 @@ _STEP = 1e-5
 
 @dataclass(frozen=True)
 class ModeEvent(Augmentation):
-    """An event of the kind `event` along the modes of `base`: "extremum", "LP" or "BP".
+    """Events along the modes of `base`: see the classes for the kinds.
 
     `right`, `left` border K in units of these: rows of `force` times one plus the square of the multiple of omega,
     weighted by masses; columns of `size` of the motion, weighted by masses, 1, and `omega`; `action` of J_U.
     """
 
     base: NonlinearMode
-    event: str
     right: Array
     left: Array
     force: float
     size: float
     omega: float
     action: float
-
-    @property
-    def name(self) -> str:
-        """Kind of curve."""
-        return self.base.name if self.event == "extremum" else self.event
-
-    @property
-    def turning(self) -> str:  # type: ignore[override]
-        """omega at its extrema."""
-        return "omega" if self.event == "extremum" else ""
+    #: whether what is extreme is the action, not omega; whether Y_U loses rank
+    of_action = False
+    crossing = False
 
     @property
     def extras(self) -> int:
         """zeta, and the unfolding of a branch point."""
-        return 2 if self.event == "BP" else 1
+        return 2 if self.crossing else 1
 
     @property
     def free_phase(self) -> bool:
         """As of the mode."""
         return True
-
-    @property
-    def trivial(self) -> int:  # type: ignore[override]
-        """Those of the mode, and the two of the event."""
-        return 2 if self.event == "extremum" else 4
 
     @property
     def own(self) -> Augmentation:
@@ -90,7 +77,7 @@ class ModeEvent(Augmentation):
     def through(cls, item: Bifurcation, state: BalanceState, names: tuple[str, ...]) -> tuple[ModeEvent, Array]:
         """See `Augmentation.through`."""
         base, extra = NonlinearMode.through(item, state, names)
-        blank = cls(base, item.kind, np.zeros(0), np.zeros(0), *_units(state))
+        blank = cls(base, np.zeros(0), np.zeros(0), *_units(state))
         kept = fed(state, float(extra[0]))
         u, _, vt = np.linalg.svd(blank.at(kept, np.append(extra, 0.0), names).matrix)
         event = replace(blank, right=vt[-1], left=u[:, -1])
@@ -103,7 +90,7 @@ class ModeEvent(Augmentation):
         return self.base.zeta(extra)
 
     def unfolding(self, extra: Array) -> float:
-        return float(extra[1]) if self.event == "BP" else 0.0
+        return float(extra[1]) if self.crossing else 0.0
 
     def at(self, state: BalanceState, extra: Array, names: tuple[str, ...]) -> ModeEventEquations:
         return ModeEventEquations(self, state, extra, names)
@@ -117,6 +104,34 @@ class ModeEvent(Augmentation):
         right, left = (v / length(v) for v in vectors)
         base = replace(self.base, reference=self.base.basis.resized(self.base.reference, basis), basis=basis)
         return replace(self, base=base, right=right, left=left)
+
+
+class ModeExtremum(ModeEvent):
+    """omega is extreme along the modes."""
+
+    name = NonlinearMode.name
+    turning = "omega"
+    trivial = 2
+
+
+class ModeLimitPoint(ModeEvent):
+    """Energy and action are: two more multipliers are +1."""
+
+    name = "LP"
+    trivial = 4
+    of_action = True
+
+
+class ModeBranchPoint(ModeEvent):
+    """Modes cross, and two more multipliers are +1."""
+
+    name = "BP"
+    trivial = 4
+    crossing = True
+
+
+#: by what was located along a mode
+MODE_EVENTS: dict[str, type[ModeEvent]] = {"extremum": ModeExtremum, "LP": ModeLimitPoint, "BP": ModeBranchPoint}
 
 
 def _units(state: BalanceState) -> tuple[float, float, float, float]:
@@ -166,7 +181,7 @@ class ModeEventEquations(Equations):
         out = np.zeros((n + 2, n + 2))
         out[: n + 1] = self.base.jacobian(self.names)[:, : n + 2]
         out[:n] *= self._rows[:, None]
-        if self.of.event == "LP":
+        if self.of.of_action:
             # of the motion under its own forces
             slope = action_gradient(fed(self.state, -float(self.extra[0])))
             out[-1, :n], out[-1, -1] = slope[:n] / self.of.action, slope[n] / self.of.action
@@ -223,7 +238,7 @@ class ModeEventEquations(Equations):
         own, n = self.base.jacobian(names), self.state.balance.dimension
         out = np.zeros((n + len(self.rows), self.rows.shape[1]))
         out[:n, : n + 1], out[:n, -2:] = own[:n, : n + 1], own[:n, -2:]
-        if self.of.event == "BP":
+        if self.of.crossing:
             out[:n, n + 1] = self._unfolded
         out[n:] = self.rows
         return out
@@ -232,4 +247,4 @@ class ModeEventEquations(Equations):
         v, w, _, _ = self._solved
         force, size, omega, action = _units(fed(self.state, -float(self.extra[0])))
         base, right, left = self.base.renewed(), v / length(v), w / length(w)
-        return ModeEvent(base, self.of.event, right, left, force, size, omega, action)
+        return type(self.of)(base, right, left, force, size, omega, action)

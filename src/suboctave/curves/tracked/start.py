@@ -17,7 +17,7 @@ from suboctave.curves.augmentation import Augmentation
 from suboctave.curves.events.formulation import BORDERED, Formulation
 from suboctave.curves.kinds.extremum import BorderedExtremal, LimitPointExtremal
 from suboctave.curves.kinds.limit_cycle import CycleWith
-from suboctave.curves.kinds.mode_event import ModeEvent
+from suboctave.curves.kinds.mode_event import MODE_EVENTS
 from suboctave.curves.kinds.nonlinear_mode import NonlinearMode
 from suboctave.curves.kinds.singular import SingularOperator
 from suboctave.curves.motion import MotionProblem
@@ -83,7 +83,7 @@ def curve_through(
     state = balance.at(x, orbit.omega)
     equations: type[Augmentation] = CycleWith if on_free_phase(item) else formulation.equations(kind_of(item))
     if on_mode(item) and len(names) == 2:
-        equations = ModeEvent
+        equations = MODE_EVENTS[item.kind]
     augmentation, extra = equations.through(item, state, names)
     force = state.balanced.scale
     curve = MotionProblem(
