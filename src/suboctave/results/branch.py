@@ -220,8 +220,12 @@ class Branch(CurveTables, BranchReadings):
 
     @cached_property
     def stable(self) -> np.ndarray:
-        """Whether each motion is stable, shape (len,), bool."""
-        return np.array([p.floquet.stable for p in self.points])
+        """Whether each motion is stable, shape (len,), bool: see `stable_at`."""
+        return np.array([self.stable_at(point) for point in self.points], dtype=bool)
+
+    def stable_at(self, point: BranchPoint) -> bool:
+        """Whether the motion at a point is stable."""
+        return point.floquet.stable
 
     def deciding(self, point: BranchPoint, multipliers: ComplexArray) -> NDArray[np.bool_]:
         """Which multipliers of the motion at a point decide whether it is stable: all, (m,), bool."""
@@ -382,14 +386,12 @@ class TrackedBranch(Branch):
         """
         return self.bifurcations["extremum"]
 
-    @cached_property
-    def stable(self) -> np.ndarray:
-        """Whether all multipliers but the critical one (or pair) lie inside the unit circle, shape (len,), bool.
-
-        Where they do, the curve is a border of stable motions.
+    def stable_at(self, point: BranchPoint) -> bool:
+        """Whether all multipliers but the critical one (or pair) lie inside the unit circle: where they do, the curve
+        is a border of stable motions.
         """
-        sizes = ((p, np.abs(p.floquet.multipliers)) for p in self.points)
-        return np.array([np.all(mu[self.deciding(p, p.floquet.multipliers)] < 1.0) for p, mu in sizes], dtype=bool)
+        mu = point.floquet.multipliers
+        return bool(np.all(np.abs(mu[self.deciding(point, mu)]) < 1.0))
 
     @property
     def verdicts(self) -> str:

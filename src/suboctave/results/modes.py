@@ -71,21 +71,18 @@ class ModeCurve(TrackedBranch):
         """`sqrt(c . M c)`, c the amplitudes at omega: that of a mode shape of unit modal mass, (len,)."""
         return np.array([modal_amplitude(state) for state in self._states()])
 
-    @property
-    def stable(self) -> np.ndarray:
-        """Of a conservative mode whether no multiplier lies off the unit circle but the two that are +1 by themselves,
-        (len,), bool. Of a damped one True: its motions are those of no system that stands by itself, and their
-        stability is not told.
-        """
-        return np.array([self.damped or self._on_circle(point) for point in self.points], dtype=bool)
-
     def deciding(self, point: BranchPoint, multipliers: ComplexArray) -> NDArray[np.bool_]:
         """See `Branch.deciding`: all but the two that are +1 by themselves, and two more on curves of LP and BP."""
         others = np.ones(len(multipliers), dtype=bool)
         others[np.argsort(np.abs(multipliers - 1.0), kind="stable")[: 4 if self.kind in ("LP", "BP") else 2]] = False
         return others
 
-    def _on_circle(self, point: BranchPoint) -> bool:
+    def stable_at(self, point: BranchPoint) -> bool:
+        """Of a conservative mode whether no multiplier lies off the unit circle but the two that are +1 by themselves.
+        Of a damped one True: its motions are those of no system that stands by itself, their stability is not told.
+        """
+        if self.damped:
+            return True
         mu, errors = point.floquet.multipliers, point.floquet.errors
         others = self.deciding(point, mu)
         return bool(np.all(np.abs(mu[others]) <= 1.0 + np.maximum(ON_CIRCLE, errors[others])))

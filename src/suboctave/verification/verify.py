@@ -143,7 +143,7 @@ def _judged(branch: Branch, i: int, shot: Shot, tolerance: float) -> VerifiedPoi
     point = branch.points[i]
     floquet, distance, multipliers = point.floquet, shot.distance, shot.multipliers
     stable, error, known = None, math.inf, floquet.applicable
-    computed = bool(branch.stable[i])
+    computed = branch.stable_at(point)
     if not shot.converged:
         outcome, reason = OPEN, "Shooting did not arrive at a motion from here"
         if distance > 100.0 * tolerance or not np.isfinite(distance):

@@ -28,11 +28,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from suboctave.continuation.linear import Factor, length
+from suboctave.continuation.linear import length
 from suboctave.curves.augmentation import Augmentation, Equations
+from suboctave.curves.kinds.bordering import bordered_factor, column_sizes, row_factors, sizes_of, with_harmonics
 from suboctave.curves.kinds.branch_point import BranchPointEquations, BranchPointUnfolded
 from suboctave.curves.kinds.singular import SingularEquations, SingularOperator
-from suboctave.errors import ConvergenceError
 from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.lazy import lazy
@@ -225,7 +225,7 @@ class BorderedExtremal(Extremal):
         `sizes` are those of all free parameters by name, `extra_sizes` those of the extra unknowns.
         """
         blank = np.zeros(0)
-        own = cls(base, beside, blank, blank, *_units(state), dict(sizes), extra_sizes, turning)
+        own = cls(base, beside, blank, blank, *sizes_of(state), dict(sizes), extra_sizes, turning)
         u, _, vt = np.linalg.svd(own.at(state, extra, tuple(sizes)).matrix)
         return replace(own, right=vt[-1], left=u[:, -1])
 
@@ -234,23 +234,8 @@ class BorderedExtremal(Extremal):
 
     def resized(self, basis: HarmonicBasis, size: int) -> BorderedExtremal:
         rest = self.base.extras + 1
-        vectors = (_with_harmonics(v, basis.size * size, rest) for v in (self.right, self.left))
-        right, left = (v / length(v) for v in vectors)
+        right, left = (with_harmonics(v, basis.size * size, rest) for v in (self.right, self.left))
         return replace(self, base=self.base.resized(basis, size), right=right, left=left)
-
-
-def _units(state: BalanceState) -> tuple[float, float]:
-    """Sizes of the forces and of the motion, those of rest taken for one."""
-    weight = state.balance.per_unknown(state.balance.scales()[0])
-    return state.balanced.scale or 1.0, length(weight * state.x.ravel()) or 1.0
-
-
-def _with_harmonics(vector: Array, count: int, rest: int) -> Array:
-    """The coefficients cut or filled with zeros to `count`, the last `rest` entries kept."""
-    coefficients = np.zeros(count)
-    had = vector[: len(vector) - rest]
-    coefficients[: min(count, len(had))] = had[:count]
-    return np.concatenate((coefficients, vector[len(vector) - rest :]))
 
 
 class BorderedExtremalEquations(ExtremalEquations):
@@ -260,17 +245,14 @@ class BorderedExtremalEquations(ExtremalEquations):
     def _whole(self) -> Array:
         """Derivatives of Y by all unknowns in the units of `BorderedExtremal`, (m, m + number of names - 1)."""
         state, out = self.state, self.base.jacobian(self.names)
-        masses = state.balance.per_unknown(state.balance.scales()[1])
-        waves = np.repeat(state.basis.multiples[(np.arange(state.basis.size) + 1) // 2], state.balance.size)
-        out[: len(masses)] *= (masses / (self.of.force * (1.0 + waves**2)))[:, None]
+        out[: state.balance.dimension] *= row_factors(state, self.of.force)[:, None]
         return out * self._sizes
 
     @lazy
     def _sizes(self) -> Array:
         """Of the unknowns."""
         state, of = self.state, self.of
-        weight = state.balance.per_unknown(state.balance.scales()[0])
-        return np.concatenate((of.size / weight, of.extra_sizes, [of.sizes[name] for name in self.names]))
+        return np.concatenate((column_sizes(state, of.size), of.extra_sizes, [of.sizes[name] for name in self.names]))
 
     @lazy
     def _kept(self) -> Array:
@@ -287,14 +269,7 @@ class BorderedExtremalEquations(ExtremalEquations):
     @lazy
     def _solved(self) -> tuple[Array, float, Array]:
         """v, h, and the left vector w."""
-        matrix = self.matrix
-        m = len(matrix)
-        extended = np.zeros((m + 1, m + 1), order="F")
-        extended[:m, :m] = matrix
-        extended[:m, m], extended[m, :m] = self.of.left, self.of.right
-        factor = Factor.of(extended, overwrite=True)
-        if factor.singular:
-            raise ConvergenceError("two extrema or singular points fall together: the bordered matrix is singular")
+        factor, m = bordered_factor(self.matrix, self.of.left, self.of.right), len(self.of.right)
         last = np.eye(1, m + 1, m)[0]
         v, w = factor.solve(last), factor.solve(last, adjoint=True)
         return v[:m], float(v[m]), w[:m]
@@ -335,6 +310,6 @@ class BorderedExtremalEquations(ExtremalEquations):
 
     def renewed(self) -> BorderedExtremal:
         v, _, w = self._solved
-        force, size = _units(self.state)
+        force, size = sizes_of(self.state)
         right, left = v / length(v), w / length(w)
         return replace(self.of, base=self.base.renewed(), right=right, left=left, force=force, size=size)

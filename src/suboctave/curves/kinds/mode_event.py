@@ -23,10 +23,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from suboctave.bifurcation.bifurcation import Bifurcation
-from suboctave.continuation.linear import Factor, length
+from suboctave.continuation.linear import length
 from suboctave.curves.augmentation import Augmentation, Equations
+from suboctave.curves.kinds.bordering import bordered_factor, column_sizes, row_factors, sizes_of, with_harmonics
 from suboctave.curves.kinds.nonlinear_mode import ModeEquations, NonlinearMode
-from suboctave.errors import ConvergenceError
 from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.energy import action_gradient, fed
 from suboctave.harmonic.evaluation import BalanceState
@@ -96,12 +96,7 @@ class ModeEvent(Augmentation):
         return ModeEventEquations(self, state, extra, names)
 
     def resized(self, basis: HarmonicBasis, size: int) -> ModeEvent:
-        vectors = []
-        for vector in (self.right, self.left):
-            kept = np.zeros(basis.size * size)
-            kept[: min(len(kept), len(vector) - 2)] = vector[:-2][: len(kept)]
-            vectors.append(np.append(kept, vector[-2:]))
-        right, left = (v / length(v) for v in vectors)
+        right, left = (with_harmonics(v, basis.size * size, 2) for v in (self.right, self.left))
         base = replace(self.base, reference=self.base.basis.resized(self.base.reference, basis), basis=basis)
         return replace(self, base=base, right=right, left=left)
 
@@ -136,10 +131,9 @@ MODE_EVENTS: dict[str, type[ModeEvent]] = {"extremum": ModeExtremum, "LP": ModeL
 
 def _units(state: BalanceState) -> tuple[float, float, float, float]:
     """Sizes of the forces, of the motion, of omega, and of the gradient of the action over a change of the motion."""
-    weight = state.balance.per_unknown(state.balance.scales()[0])
-    size = length(weight * state.x.ravel()) or 1.0
-    slope = action_gradient(state)[:-1] * size / weight
-    return state.balanced.scale or 1.0, size, state.omega, length(slope) or 1.0
+    force, size = sizes_of(state)
+    slope = action_gradient(state)[:-1] * column_sizes(state, size)
+    return force, size, state.omega, length(slope) or 1.0
 
 
 class ModeEventEquations(Equations):
@@ -158,10 +152,7 @@ class ModeEventEquations(Equations):
     @lazy
     def _rows(self) -> Array:
         """Units of the rows of R."""
-        state = self.state
-        masses = state.balance.per_unknown(state.balance.scales()[1])
-        waves = np.repeat(state.basis.multiples[(np.arange(state.basis.size) + 1) // 2], state.balance.size)
-        return np.asarray(masses / (self.of.force * (1.0 + waves**2)))
+        return row_factors(self.state, self.of.force)
 
     @property
     def _unfolded(self) -> Array:
@@ -171,8 +162,7 @@ class ModeEventEquations(Equations):
     @lazy
     def _sizes(self) -> Array:
         """Of the unknowns of the mode."""
-        weight = self.state.balance.per_unknown(self.state.balance.scales()[0])
-        return np.append(self.of.size / weight, [1.0, self.of.omega])
+        return np.append(column_sizes(self.state, self.of.size), [1.0, self.of.omega])
 
     @lazy
     def matrix(self) -> Array:
@@ -192,14 +182,7 @@ class ModeEventEquations(Equations):
     @lazy
     def _solved(self) -> tuple[Array, Array, Array, float]:
         """v, the left vector w, z, and h."""
-        matrix = self.matrix
-        m = len(matrix)
-        extended = np.zeros((m + 1, m + 1), order="F")
-        extended[:m, :m] = matrix
-        extended[:m, m], extended[m, :m] = self.of.left, self.of.right
-        factor = Factor.of(extended, overwrite=True)
-        if factor.singular:
-            raise ConvergenceError("two events of a nonlinear mode fall together: the bordered matrix is singular")
+        factor, m = bordered_factor(self.matrix, self.of.left, self.of.right), len(self.of.right)
         last = np.eye(m + 1)[-2:]
         v, w, z = factor.solve(last[1]), factor.solve(last[1], adjoint=True), factor.solve(last[0])
         return v[:m], w[:m], z[:m], float(v[m])
