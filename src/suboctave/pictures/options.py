@@ -338,8 +338,8 @@ class Coordinates:
         view, texts = self.view, []
         for index, name in enumerate(self.names):
             text = view.of_omega(datasets) if name == "omega" else view.label(datasets) if name is None else name
-            if name == "omega" and datasets and all("shows" in dataset.attrs for dataset in datasets):
-                # of motions that nothing drives
+            if name == "omega" and datasets and all({"shows", "damped"} & set(d.attrs) for d in datasets):
+                # of motions that nothing drives, and of bifurcations of modes
                 text = text.removeprefix("forcing ")
             unit = view.unit if index == self._scaled else None
             if name is None and unit is None:
