@@ -109,6 +109,8 @@ def solved_again(
 
 def crossing_matrix(point: CurvePoint) -> Array:
     """`[F_u; t]`, columns in scaled arclength, rows of unit length: singular where another curve of F = 0 crosses."""
-    matrix = np.vstack((point.evaluation.jacobian / point.weights, point.weights * point.tangent))
-    result: Array = matrix / np.linalg.norm(matrix, axis=1)[:, None]
-    return result
+    matrix: Array = np.empty((len(point.u), len(point.u)))
+    np.divide(point.evaluation.jacobian, point.weights, out=matrix[:-1])
+    np.multiply(point.weights, point.tangent, out=matrix[-1])
+    matrix /= np.sqrt(np.einsum("ij,ij->i", matrix, matrix))[:, None]
+    return matrix

@@ -341,7 +341,11 @@ class Condensed:
     def feeding(self, frequency: Array) -> ComplexArray:
         """See `LinearPart.feeding`."""
         _, right, left = self._eliminated(frequency)
-        return self._own._replace(entries=feeding_matrices(self._own.entries)).between(frequency, 0, left, right)
+        return self._feeding.between(frequency, 0, left, right)
+
+    @lazy
+    def _feeding(self) -> Stack:
+        return self._own._replace(entries=feeding_matrices(self._own.entries))
 
     # ----------------------------------------------------------------------------------------------------- contract
     def stiffness(self, frequency: NDArray[Any], order: int = 0) -> ComplexArray:

@@ -14,7 +14,8 @@ from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis, harmoni
 from suboctave.harmonic.energy import fed
 from suboctave.harmonic.evaluation import BalanceState, HarmonicBalance
 from suboctave.harmonic.linear_part import LinearPart
-from suboctave.harmonic.trigonometric import motion, peak
+from suboctave.harmonic.quadrature import peak
+from suboctave.harmonic.trigonometric import motion
 from suboctave.harmonic.truncation import AdaptiveHarmonics
 from suboctave.model.elements.coupled import as_coupled
 from suboctave.model.system import System
@@ -145,15 +146,15 @@ class PeriodicOrbit:
 
     def amplitude(self, dof: int = 0) -> float:
         """Largest |x| of a DOF over the motion's period, found by Newton's method on dx/dt = 0."""
-        return _peak(self._along(dof))
+        return peak(self._along(dof))[0]
 
     def velocity_amplitude(self, dof: int = 0) -> float:
         """Largest |dx/dt| of a DOF over the motion's period, as `amplitude`."""
-        return _peak(self._along(dof, 1))
+        return peak(self._along(dof, 1))[0]
 
     def acceleration_amplitude(self, dof: int = 0) -> float:
         """Largest second derivative of x of a DOF, in modulus, over the motion's period, as `amplitude`."""
-        return _peak(self._along(dof, 2))
+        return peak(self._along(dof, 2))[0]
 
     def rms(self, dof: int = 0, derivative: int = 0) -> float:
         """Root mean square of x over the period, its mean included, or of a derivative by t.
@@ -196,14 +197,9 @@ def _unit(n: int, dof: int) -> Array:
     return unit
 
 
-def _peak(c: ComplexArray) -> float:
-    """The largest modulus of a real signal with complex amplitudes c, (H + 1,)."""
-    return peak(np.ascontiguousarray(c), 8 * len(c))[0]
-
-
 def amplitude_along(state: BalanceState, dof: int) -> float:
     """Largest |x| of a DOF along an evaluated motion, as `PeriodicOrbit.amplitude`."""
-    return _peak(state.recovered @ state.linear.seen(_unit(state.balance.system.n, dof)))
+    return peak(state.recovered @ state.linear.seen(_unit(state.balance.system.n, dof)))[0]
 
 
 def force_along(state: BalanceState, element: int) -> Callable[[Array], Array]:

@@ -26,7 +26,7 @@ import numpy as np
 
 from suboctave.compiled import kernel
 from suboctave.harmonic.basis import Array, ComplexArray
-from suboctave.harmonic.trigonometric import FAST, displacement, jet
+from suboctave.harmonic.trigonometric import FAST, displacement, extrema, jet
 
 #: fewest and most uniform samples per period of laws of unknown smoothness
 FEWEST, MOST = 32, 1 << 15
@@ -73,6 +73,16 @@ def uniform_nodes(count: int) -> Nodes:
 def search_grid(high: int) -> Nodes:
     """Equidistant instants, close enough for searches along a motion of harmonics up to `high`."""
     return uniform_nodes(8 * high + 8)
+
+
+def peak(c: ComplexArray) -> tuple[float, float, float]:
+    """Largest modulus of `Re sum_k c_k exp(i k tau)` over a period and where: (max |x|, tau, x there)."""
+    grid = search_grid(len(c) - 1)
+    tau, value, _ = extrema(np.ascontiguousarray(c), grid.zr, grid.zi)
+    if not len(tau):
+        return abs(float(c[0].real)), 0.0, float(c[0].real)
+    i = int(np.argmax(np.abs(value)))
+    return abs(float(value[i])), float(tau[i]), float(value[i])
 
 
 def polynomial_nodes(highest: int, top: int) -> Nodes:

@@ -308,19 +308,6 @@ def crossings(c: ComplexArray, level: float, zr: Array, zi: Array) -> tuple[Arra
     return result
 
 
-def peak(c: ComplexArray, samples: int) -> tuple[float, float, float]:
-    """Largest modulus of `Re sum_k c_k exp(i k tau)` over a period and where: (max |x|, tau, x there).
-
-    `samples`: equidistant instants from which extrema are looked for.
-    """
-    angle = 2.0 * math.pi * np.arange(samples) / samples
-    tau, value, _ = extrema(c, np.cos(angle), np.sin(angle))
-    if not len(tau):
-        return abs(float(c[0].real)), 0.0, float(c[0].real)
-    i = int(np.argmax(np.abs(value)))
-    return abs(float(value[i])), float(tau[i]), float(value[i])
-
-
 @kernel()
 def passages(ta, xa, sa, level_a, tb, xb, sb, level_b):
     """Extrema that pass a level between two neighbouring motions a and b (instants t, values x, curvatures s).

@@ -35,8 +35,8 @@ from suboctave.errors import InputError, shortened, suggest
 from suboctave.harmonic.basis import Array, ComplexArray, harmonic_index, to_complex
 from suboctave.harmonic.energy import action, damping_ratio, mean_energy, modal_amplitude
 from suboctave.harmonic.orbit import PeriodicOrbit, force_along
-from suboctave.harmonic.quadrature import search_grid
-from suboctave.harmonic.trigonometric import crossings, extrema, peak
+from suboctave.harmonic.quadrature import peak, search_grid
+from suboctave.harmonic.trigonometric import crossings, extrema
 from suboctave.model.elements.smoothness import levels as levels_of
 from suboctave.model.inputs import check_element
 from suboctave.model.system import System
@@ -410,4 +410,4 @@ def of_harmonic(amplitudes: ComplexArray, k: float, nu: int) -> float:
 
 def largest(amplitudes: ComplexArray) -> float:
     """Largest modulus over a period."""
-    return peak(np.ascontiguousarray(amplitudes), 8 * len(amplitudes))[0]
+    return peak(amplitudes)[0]

@@ -57,6 +57,21 @@ class LimitCycle(Augmentation):
     def at(self, state: BalanceState, extra: Array, names: tuple[str, ...]) -> CycleEquations:
         return CycleEquations(self, state, names)
 
+    def held(self, state: BalanceState) -> tuple[Array, Array]:
+        """The reference's oscillation, weighted as `oscillating`, and the derivative of the phase condition by X,
+        (dimension,): the same at all motions of a discretisation.
+        """
+        weights, known = state.balance.scales()[0], vars(self).get("_held")
+        if known is None or known[0] is not weights:
+            reference = self.reference * weights
+            reference[0] = 0.0
+            # D Y
+            turning = state.basis.derivative(reference)
+            row = (turning * weights).ravel() / ((length(turning) or 1.0) * self.size)
+            known = vars(self)["_held"] = weights, (reference, row)
+        kept: tuple[Array, Array] = known[1]
+        return kept
+
     def resized(self, basis: HarmonicBasis, size: int) -> LimitCycle:
         return replace(self, reference=self.basis.resized(self.reference, basis), basis=basis)
 
@@ -73,24 +88,21 @@ class CycleEquations(Equations):
 
     def __init__(self, of: LimitCycle, state: BalanceState, names: tuple[str, ...]) -> None:
         self.of, self.state, self.names = of, state, names
-        self.weights = state.balance.scales()[0]
-        reference = of.reference * self.weights
-        k = np.arange(1, state.basis.harmonics + 1)[:, None]
-        #: D Y
-        self.turning = np.zeros_like(reference)
-        self.turning[1::2], self.turning[2::2] = k * reference[2::2], -k * reference[1::2]
-        reference[0] = 0.0
-        self.reference = reference
-        self.unit = (length(self.turning) or 1.0) * of.size
+        self.reference, self.row = of.held(state)
 
     @property
     def values(self) -> Array:
-        return np.array([float(np.vdot(self.turning, self.state.x * self.weights)) / self.unit])
+        return np.array([self.row.dot(self.state.unknowns)])
 
     @lazy
     def rows(self) -> Array:
-        along = (self.turning * self.weights).ravel() / self.unit
-        return np.append(along, np.zeros(len(self.names)))[None]
+        return self.beside(self.of.extras)
+
+    def beside(self, extras: int) -> Array:
+        """The derivatives of the phase condition among so many extra unknowns."""
+        rows = np.zeros((1, len(self.row) + extras + len(self.names)))
+        rows[0, : len(self.row)] = self.row
+        return rows
 
     def renewed(self) -> LimitCycle:
         x, y = oscillating(self.state), self.reference
@@ -136,8 +148,7 @@ class CycleWithEquations(SingularEquations):
 
     @property
     def rows(self) -> Array:
-        phase = np.insert(self.cycle.rows, [self.state.balance.dimension] * self.of.extras, 0.0, axis=1)
-        return np.concatenate((phase, super().rows))
+        return np.concatenate((self.cycle.beside(self.of.extras), super().rows))
 
     def renewed(self) -> CycleWith:
         own = super().renewed()

@@ -22,7 +22,6 @@ from suboctave.harmonic.assembly import apply_blocks
 from suboctave.harmonic.basis import Array
 from suboctave.harmonic.energy import damping_ratio
 from suboctave.harmonic.evaluation import BalanceState
-from suboctave.lazy import lazy
 
 #: step of the difference by which masses enter, in units of the parameter
 _STEP = 1e-5
@@ -78,10 +77,6 @@ class ModeEquations(CycleEquations):
         self.zeta = zeta
         #: R differentiated by zeta
         self.column: Array = _by_zeta(state)
-
-    @lazy
-    def rows(self) -> Array:
-        return np.insert(super().rows, self.state.balance.dimension, 0.0, axis=1)
 
     def jacobian(self, names: tuple[str, ...]) -> Array:
         out, n = super().jacobian(names), self.state.balance.dimension

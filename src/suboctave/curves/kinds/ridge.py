@@ -25,7 +25,7 @@ from suboctave.curves.augmentation import Augmentation, Equations
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.basis import Array, HarmonicBasis, harmonic_index, to_complex
 from suboctave.harmonic.evaluation import BalanceState
-from suboctave.harmonic.trigonometric import peak
+from suboctave.harmonic.quadrature import peak
 from suboctave.lazy import lazy
 
 #: step of the difference of Jacobians, in units of the motion and of the first parameter
@@ -115,7 +115,7 @@ class RidgeEquations(Equations):
             rows[0, at : at + 2], rows[1, at : at + 2] = z / size, (-z[1] / size, z[0] / size)
             along, across = (np.outer(row, reads).ravel() for row in rows)
             return size, along, across, 1.0 / size
-        size, tau, value = peak(np.ascontiguousarray(c), 8 * state.basis.harmonics + 8)
+        size, tau, value = peak(c)
         k = np.arange(len(c))
         bend = float(np.real(-(k**2) * c @ np.exp(1j * k * tau)))
         side = 1.0 if value >= 0.0 else -1.0

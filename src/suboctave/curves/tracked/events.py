@@ -396,6 +396,8 @@ class StepWatch(Steps):
         super().__init__()
         self.tests = tests
         self.newton = newton
+        #: whether limit points may turn back abruptly
+        self.cusped = any(isinstance(test, Cusp) for test in tests)
         #: the functions of the tests at the last points
         self._functions: dict[Sample, Array] = {}
         self._last: _Step | None = None
@@ -473,7 +475,7 @@ class _Step(Interior):
     @property
     def corner(self) -> bool:
         """Whether limit points turn back where a contact grazes: as at a cusp in both parameters, but abruptly."""
-        if not any(isinstance(test, Cusp) for test in self.steps.tests):
+        if not self.steps.cusped:
             return False
         pairs = itertools.pairwise(self.inside)
         return any(all(p.slopes[n] * q.slopes[n] < 0.0 for n in p.slopes) and self.steps.grazes(p, q) for p, q in pairs)
