@@ -164,15 +164,14 @@ class Coordinates(NamedTuple):
 class Condensed:
     """The condensed linear part of a system at values of its parameters; made by `linear_part_of`.
 
-    `size` unknowns, `covers` the highest circular frequency that its basis is made for, `error` of its flexibility
-    there, relative.
+    `size` unknowns, `covers` the highest circular frequency that its basis is made for.
     """
 
     def __init__(self, reduction: Reduction, values: Mapping[str, float]) -> None:
         self.reduction, self.projected, self.values = reduction, reduction.projected, dict(values)
         self.system = reduction.system
         self.size = len(reduction.directions)
-        self.covers, self.error = self.projected.covers, self.projected.error
+        self.covers = self.projected.covers
         #: the part at the last other values, and one that covers more
         self._other: Condensed | None = None
         self._wider: Condensed | None = None
@@ -187,6 +186,11 @@ class Condensed:
         if self.projected.shapes is None:
             return None
         return {"frequency": self.covers, "scale": self.reduction.scale, "observed": list(self.reduction.observed)}
+
+    @property
+    def error(self) -> float:
+        """Of its flexibility at the highest frequency that it covers, relative, against a direct solution."""
+        return self.reduction.error
 
     @property
     def frequencies(self) -> Array:

@@ -28,6 +28,7 @@ from scipy.linalg import eigh
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.interruption import check_time
+from suboctave.lazy import lazy
 from suboctave.model.matrices import MatrixCoefficient, sparse_factors
 from suboctave.model.system import System
 
@@ -35,8 +36,8 @@ from suboctave.model.system import System
 COMPLETE = 40
 #: error of the flexibility, relative, that a basis is grown for
 _TOLERANCE = 1e-11
-#: frequencies at which a basis is tested, as shares of the highest, and at how many of them it is grown at once
-_TESTED, _AT_ONCE = tuple(np.linspace(1.0, 0.0, 17)[:-1].tolist()), 2
+#: frequencies at which a basis is tested, as shares of the highest
+_TESTED = tuple(np.linspace(1.0, 0.0, 17)[:-1].tolist())
 #: part of the residual, relative to the largest, that is worth a vector
 _WORTH = 1e-6
 #: error below which steps without progress, so many, mean that rounding is all that is left
@@ -46,8 +47,8 @@ _PROMISING, _PATIENCE = 1e-5, 4
 _SETTLED, _COMPARED = 1e-7, 96
 #: error of the flexibility, relative, beyond which a projection is refused
 _WRONG = 1e-3
-#: most vectors of a basis
-_MOST = 600
+#: most vectors of a basis; for how many there is room at first
+_MOST, _ROOM = 600, 40
 #: relative change of an expression in a matrix that a basis is trusted over without a test
 _TRUSTED = 0.05
 
@@ -63,16 +64,12 @@ class Projected(NamedTuple):
         The directions in it, D V, (m, r).
     covers
         Highest frequency it is made for.
-    error
-        Of the flexibility at the highest frequency, relative, against a direct solution of the whole structure; 0 for
-        the structure itself.
     """
 
     matrices: tuple[MatrixCoefficient, ...]
     shapes: Array | None
     seen: Array
     covers: float
-    error: float
 
 
 class Reduction:
@@ -83,7 +80,8 @@ class Reduction:
     what one curve asks for does not change what others have, and what several ask for is made once.
     """
 
-    projected: Projected
+    #: values of the parameters that it was made at
+    _values: Mapping[str, float]
 
     def __init__(
         self, system: System, directions: Array, served: Array, observed: tuple[int, ...], scale: float
@@ -95,10 +93,11 @@ class Reduction:
         self.scale = scale
         self._matrices = system.linear_parts
         self._shapes = np.zeros((system.n, 0))
+        self._small: list[Array] = []
         self._solve: Any = None
         #: expressions in the matrices and the highest frequency, where the basis was tested
         self._tested: list[tuple[Array, float]] = []
-        #: what has grown from it and is in use, by what it was grown for
+        #: all that have grown from one and are in use, by what they were grown for
         self._larger: weakref.WeakValueDictionary[tuple[Any, ...], Reduction] = weakref.WeakValueDictionary()
 
     @classmethod
@@ -115,7 +114,6 @@ class Reduction:
         """The smallest basis that serves up to a frequency at these values of the parameters."""
         made = cls(system, directions, served, observed, scale)
         if system.n <= COMPLETE:
-            made.projected = Projected(made._matrices, None, directions, math.inf, 0.0)
             return made
         at = made._expressions(values)
         key = (*map(id, made._matrices), *(a.tobytes() for a in (directions, served, at)), observed, scale, frequency)
@@ -126,11 +124,19 @@ class Reduction:
 
     def covering(self, frequency: float, values: Mapping[str, float]) -> Reduction:
         """This one, or one that serves up to a frequency at these values of the parameters."""
-        if self.projected.shapes is None:
+        if self.system.n <= COMPLETE:
             return self
-        at = self._expressions(values)
-        serving = next((one for one in (self, *self._larger.values()) if one._serves(frequency, at)), None)
-        return serving or _kept(self._larger, (frequency, at.tobytes()), lambda: self._grown_to(frequency, values, at))
+        at, known = self._expressions(values), [self, *self._larger.values()]
+        serving = next((one for one in known if one._serves(frequency, at)), None)
+        # it grows from that which lacks least
+        largest = max(known, key=lambda one: one._known_to(at))
+        return serving or _kept(
+            self._larger, (frequency, at.tobytes()), lambda: largest._grown_to(frequency, values, at)
+        )
+
+    def _known_to(self, at: Array) -> float:
+        """Up to which frequency it was tested there, negative where it was not."""
+        return max((covers for tested, covers in self._tested if np.array_equal(tested, at)), default=-1.0)
 
     def _serves(self, frequency: float, at: Array) -> bool:
         """Whether it was tested there, or near by."""
@@ -141,115 +147,147 @@ class Reduction:
 
     def _grown_to(self, frequency: float, values: Mapping[str, float], at: Array) -> Reduction:
         larger = copy.copy(self)
-        larger._larger = weakref.WeakValueDictionary()
-        known_to = max((covers for tested, covers in self._tested if np.array_equal(tested, at)), default=-1.0)
-        larger._grown(frequency, values, known_to)
-        larger._tested = [*self._tested, (at, frequency)]
-        larger.projected = larger._project(values)
+        for kept in ("projected", "error"):
+            vars(larger).pop(kept, None)
+        left = larger._grown(frequency, values, self._known_to(at))
+        if not left <= _WRONG:
+            raise ConvergenceError(
+                f"the projection of the structure has an error of {left:.1e} at frequencies up to {frequency:.6g} with "
+                f"{larger._shapes.shape[1]} vectors: keep fewer harmonics, or damp the structure more"
+            )
+        larger._tested, larger._values = [*self._tested, (at, frequency)], dict(values)
         return larger
 
+    @lazy
+    def projected(self) -> Projected:
+        """The structure in the basis, turned to its modes at the values that it was grown at."""
+        if self.system.n <= COMPLETE:
+            return Projected(self._matrices, None, self.directions, math.inf)
+        mass, _, stiffness, _ = self._small
+        _, modes = eigh(0.5 * (stiffness + stiffness.T), 0.5 * (mass + mass.T))
+        shapes = self._shapes @ modes
+        matrices = tuple(matrix.projected(shapes) for matrix in self._matrices)
+        return Projected(matrices, shapes, self.directions @ shapes, max(covers for _, covers in self._tested))
+
+    @lazy
+    def error(self) -> float:
+        """Of the flexibility at the highest frequency, relative, against a direct solution of the whole structure; 0
+        for the structure itself. Known when it is asked for: the solution takes longer than most of the rest.
+        """
+        if self.projected.shapes is None:
+            return 0.0
+        seen, top = self.projected.seen, self.projected.covers
+        m, c, k, s = (matrix.value(self._values) for matrix in self.projected.matrices)
+        exact = exact_flexibility(self.system, self.directions, top, self._values)
+        off = np.abs(seen @ np.linalg.solve(k - top**2 * m + 1j * (top * c + s), seen.T) - exact)
+        size = np.sqrt(np.abs(exact.diagonal()))
+        return float((off / np.multiply.outer(size, size)).max())
+
     # ---------------------------------------------------------------------------------------------------- the basis
-    def _grown(self, top: float, values: Mapping[str, float], known_to: float) -> None:
-        """Grow the basis until it serves up to `top`; up to `known_to` it does."""
-        images = _Images([matrix.sparse_value(values) for matrix in self._matrices], self._shapes)
+    def _grown(self, top: float, values: Mapping[str, float], known_to: float) -> float:
+        """Grow the basis until it serves up to `top`; up to `known_to` it does. Returns its error as estimated."""
+        basis = _Basis([matrix.sparse_value(values) for matrix in self._matrices], self._shapes)
         if self._solve is None:
-            self._solve = factorised(images.matrices[2] + self.scale**2 * images.matrices[0]).solve
-        columns = self.served.T
-        if not self._shapes.shape[1]:
-            self._add(self._solve(np.ascontiguousarray(columns)), images)
+            self._solve = factorised(basis.matrices[2] + self.scale**2 * basis.matrices[0]).solve
+        if not basis.count:
+            basis.add(self._solve(np.ascontiguousarray(self.served.T)))
         best, since = math.inf, 0
-        order, known = [share for share in _TESTED if share * top > known_to], np.zeros((1, 1, 1), dtype=complex)
+        before: tuple[list[Array], Array] | None = None
+        order = [share for share in _TESTED if share * top > known_to]
         while True:
             check_time()
-            worst, left = 0.0, []
+            worst, lacking = -1.0, np.zeros((0, 0))
             for share in order.copy():
-                error, answers = self._left_over(share * top, images)
-                if error > worst:
+                error, answers = self._left_over(share * top, basis)
+                if not error <= worst:
+                    worst, lacking = error, answers
+                if not worst <= _TOLERANCE:
                     # the next basis is tested there first
-                    worst = error
                     order.remove(share)
                     order.insert(0, share)
-                left.append(answers)
-                if worst > _TOLERANCE and len(left) >= _AT_ONCE:
                     break
             best, since = (worst, 0) if worst < 0.5 * best or worst > _PROMISING else (best, since + 1)
-            known, last = _flexibilities(images.small, self._shapes.T @ columns, top), known
-            settled = (worst <= _TOLERANCE or since >= _PATIENCE) and _change(last, known) <= max(_SETTLED, 3.0 * worst)
-            if settled or self._shapes.shape[1] >= min(_MOST, self.system.n):
-                return
-            self._add(np.concatenate(left, axis=1), images)
+            here = list(basis.small), (self.served @ basis.shapes).T
+            settled = False
+            if before is not None and (worst <= _TOLERANCE or since >= _PATIENCE):
+                last, known = (_flexibilities(small, seen, top) for small, seen in (before, here))
+                settled = _change(last, known) <= max(_SETTLED, 3.0 * worst)
+            if settled or basis.count >= min(_MOST, self.system.n):
+                self._shapes, self._small = basis.shapes, basis.small
+                return worst
+            before = here
+            basis.add(lacking)
 
-    def _left_over(self, frequency: float, images: _Images) -> tuple[float, Array]:
-        """The estimated error of the flexibility at a frequency, relative, and what a better basis needs, (n, 2 m)."""
-        columns, m = self.served.T, len(self.served)
-        mass, damping, stiffness, structural = images.small
+    def _left_over(self, frequency: float, basis: _Basis) -> tuple[float, Array]:
+        """The estimated error of the flexibility at a frequency, relative, and what a better basis needs, (n, .)."""
+        columns, m, seen = self.served.T, len(self.served), self.served @ basis.shapes
+        mass, damping, stiffness, structural = basis.small
         dynamic = stiffness - frequency**2 * mass + 1j * (frequency * damping + structural)
-        y = np.linalg.solve(dynamic, self._shapes.T @ columns)
+        y = np.linalg.solve(dynamic, seen.T)
         # real and imaginary parts side by side
-        parts = np.concatenate((y.real, y.imag), axis=1)
-        mass, damping, stiffness, structural = (whole @ parts for whole in images.whole)
+        motion = basis.shapes @ np.concatenate((y.real, y.imag), axis=1)
+        mass, damping, stiffness, structural = (matrix @ motion for matrix in basis.matrices)
         elastic, lossy = stiffness - frequency**2 * mass, frequency * damping + structural
         rest = np.concatenate((columns - elastic[:, :m] + lossy[:, m:], -elastic[:, m:] - lossy[:, :m]), axis=1)
-        answers = self._solve(rest)
-        size = np.abs((self.served @ (self._shapes @ y)).diagonal())
-        wrong = (rest[:, :m] + 1j * rest[:, m:]).T @ (answers[:, :m] + 1j * answers[:, m:])
-        worst = float((np.abs(wrong) / np.sqrt(np.multiply.outer(size, size))).max())
-        return worst, answers / np.sqrt(np.tile(size, 2))
+        # these are about as few vectors as there are directions: with proportional damping the same at all frequencies
+        lengths = np.linalg.norm(rest, axis=0)
+        lengths[lengths == 0.0] = 1.0
+        sizes, turn = np.linalg.eigh((rest.T @ rest) / np.multiply.outer(lengths, lengths))
+        turn = turn[:, sizes > _WORTH**2 * sizes[-1]]
+        answers = self._solve(np.ascontiguousarray(rest @ (turn / lengths[:, None])))
+        whole = (rest.T @ answers) @ (turn.T * lengths)
+        wrong = whole[:m, :m] - whole[m:, m:] + 1j * (whole[:m, m:] + whole[m:, :m])
+        size = np.abs((seen @ y).diagonal())
+        return float((np.abs(wrong) / np.sqrt(np.multiply.outer(size, size))).max()), answers
 
-    def _add(self, candidates: Array, images: _Images) -> None:
-        """Add the span of candidates, orthonormal in the mass, without what is in the basis already."""
-        mass, seen = images.matrices[0], images.whole[0]
-        for _ in range(2):
-            candidates = candidates - self._shapes @ (seen.T @ candidates)
+
+class _Basis:
+    """The columns of V, (n, r), orthonormal in the mass, and M V; M, C, K, S of a structure, (n, n), in them: `small`,
+    (r, r) each.
+    """
+
+    def __init__(self, matrices: list[Any], shapes: Array) -> None:
+        self.matrices = matrices
+        self.count = shapes.shape[1]
+        #: V and M V, with room for as many columns again
+        self._room: Array = np.empty((2, 2 * self.count + _ROOM, len(shapes)))
+        self._room[:, : self.count] = shapes.T, (matrices[0] @ shapes).T
+        self.small: list[Array] = [shapes.T @ (matrix @ shapes) for matrix in matrices]
+
+    @property
+    def shapes(self) -> Array:
+        """V."""
+        return self._room[0, : self.count].T
+
+    def _beside(self, vectors: Array) -> Array:
+        """Vectors without what of them is in the basis."""
+        return vectors - self.shapes @ (self._room[1, : self.count] @ vectors)
+
+    def add(self, candidates: Array) -> None:
+        """Add the span of candidates, (n, .), without what is in the basis already."""
+        mass = self.matrices[0]
+        candidates = self._beside(self._beside(candidates))
         square = candidates.T @ (mass @ candidates)
         sizes, turn = np.linalg.eigh(0.5 * (square + square.T))
         kept = sizes > _WORTH**2 * sizes[-1]
         # no more than there are degrees of freedom
-        kept[: max(0, len(kept) - (self.system.n - self._shapes.shape[1]))] = False
+        kept[: max(0, len(kept) - (len(candidates) - self.count))] = False
         new = candidates @ (turn[:, kept] / np.sqrt(sizes[kept]))
         for _ in range(2):
-            new = new - self._shapes @ (seen.T @ new)
+            new = self._beside(new)
             square = new.T @ (mass @ new)
             new = np.linalg.solve(np.linalg.cholesky(0.5 * (square + square.T)), new.T).T
-        self._shapes = images.with_columns(self._shapes, new)
-
-    def _project(self, values: Mapping[str, float]) -> Projected:
-        """All matrices in the basis, turned to its modes at these values."""
-        mass, _, stiffness, _ = (self._shapes.T @ (m.sparse_value(values) @ self._shapes) for m in self._matrices)
-        _, modes = eigh(0.5 * (stiffness + stiffness.T), 0.5 * (mass + mass.T))
-        shapes = self._shapes @ modes
-        matrices = tuple(matrix.projected(shapes) for matrix in self._matrices)
-        top = max(covers for _, covers in self._tested)
-        seen = self.directions @ shapes
-        m, c, k, s = (matrix.value(values) for matrix in matrices)
-        exact = exact_flexibility(self.system, self.directions, top, values)
-        off = np.abs(seen @ np.linalg.solve(k - top**2 * m + 1j * (top * c + s), seen.T) - exact)
-        size = np.sqrt(np.abs(exact.diagonal()))
-        error = float((off / np.multiply.outer(size, size)).max())
-        if not error <= _WRONG:
-            raise ConvergenceError(
-                f"the projection of the structure has an error of {error:.1e} at the frequency {top:.6g} with "
-                f"{shapes.shape[1]} vectors: keep fewer harmonics, or damp the structure more"
-            )
-        return Projected(matrices, shapes, seen, top, error)
-
-
-class _Images:
-    """M, C, K, S of a structure, (n, n), along its basis: of the basis (n, r) in `whole`, in it (r, r) in `small`."""
-
-    def __init__(self, matrices: list[Any], shapes: Array) -> None:
-        self.matrices = matrices
-        self.whole: list[Array] = [matrix @ shapes for matrix in matrices]
-        self.small: list[Array] = [shapes.T @ image for image in self.whole]
-
-    def with_columns(self, shapes: Array, new: Array) -> Array:
-        """The basis with new columns, and all of this with their images."""
-        result = np.concatenate((shapes, new), axis=1)
+        new = np.ascontiguousarray(new)
+        images = [matrix @ new for matrix in self.matrices]
         for i, matrix in enumerate(self.matrices):
-            image = matrix @ new
-            self.small[i] = np.block([[self.small[i], shapes.T @ image], [new.T @ self.whole[i], new.T @ image]])
-            self.whole[i] = np.concatenate((self.whole[i], image), axis=1)
-        return result
+            ahead, behind = self.shapes.T @ images[i], (matrix.T @ new).T @ self.shapes
+            self.small[i] = np.block([[self.small[i], ahead], [behind, new.T @ images[i]]])
+        first, self.count = self.count, self.count + new.shape[1]
+        if self.count > self._room.shape[1]:
+            room = np.empty((2, 2 * self.count, len(new)))
+            room[:, :first] = self._room[:, :first]
+            self._room = room
+        self._room[:, first : self.count] = new.T, images[0].T
 
 
 #: reductions in use
@@ -279,9 +317,7 @@ def _flexibilities(small: list[Array], seen: Array, top: float) -> ComplexArray:
 
 
 def _change(one: ComplexArray, other: ComplexArray) -> float:
-    """Largest change of a flexibility, relative to its diagonal; infinite from none."""
-    if one.shape != other.shape:
-        return math.inf
+    """Largest change of a flexibility, relative to its diagonal."""
     size = np.sqrt(np.abs(np.einsum("fii->fi", other)))
     return float((np.abs(one - other) / (size[:, :, None] * size[:, None, :])).max())
 
