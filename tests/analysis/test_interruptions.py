@@ -12,6 +12,7 @@ import suboctave as so
 from suboctave import interruption
 from suboctave.continuation.ending import Ending, EndReason, interruption_of, read_endings, sentence
 from suboctave.curves import follow as follow_module
+from suboctave.errors import ConvergenceError
 from suboctave.interruption import Interruption
 from suboctave.results.files import branch_from_dataset, branch_to_dataset
 
@@ -116,6 +117,7 @@ def test_files_hold_why_a_curve_ended_and_older_ones_are_read_by_their_sentence(
         "reached the end of the range at omega = 1.3",
         "the curve closed on itself",
         "20 points computed at omega = 2; raise max_points to go on",
+        "what follows omega = 2 could not be computed: {odd}; what was computed is kept",
         "step size fell below 1e-07 at j = 0.1: {odd}. Try more harmonics, a smoother law, or a smaller min_step",
         "met the T motion at its period doubling at omega = 2.3",
         "interrupted at F = 1 in one direction, in words; what was computed is kept",
@@ -126,6 +128,26 @@ def test_files_hold_why_a_curve_ended_and_older_ones_are_read_by_their_sentence(
 def test_a_sentence_of_an_older_file_is_printed_as_it_was(text):
     assert sentence(read_endings(text)) == text
     assert any(ending.interruption is not None for ending in read_endings(text)) == ("interrupted" in text)
+
+
+def test_what_cannot_be_computed_of_a_point_ends_the_curve_and_loses_nothing(monkeypatch):
+    """A bifurcation whose refinement raised took the whole branch with it."""
+    system = so.library.reference_oscillator(p=0.55, j=0.0)
+    whole = so.frequency_response(system, (1.4, 1.0), harmonics=9)
+    searched = follow_module._Follower._search
+
+    def failing(self, a, b):
+        if len(self.trace.points) == 12:
+            raise ConvergenceError("out of reach")
+        return searched(self, a, b)
+
+    monkeypatch.setattr(follow_module._Follower, "_search", failing)
+    part = so.frequency_response(system, (1.4, 1.0), harmonics=9)
+    assert [ending.reason for ending in part.endings if ending.early] == [EndReason.FAILED]
+    assert part.ended.startswith("what follows omega = ")
+    assert part.ended.endswith("could not be computed: out of reach; what was computed is kept")
+    np.testing.assert_array_equal(part.omega, whole.omega[: len(part)])
+    assert 10 < len(part) < len(whole)
 
 
 def test_a_search_ends_where_a_tracked_curve_is_interrupted(monkeypatch):

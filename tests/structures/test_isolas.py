@@ -110,3 +110,16 @@ def test_one_basis_serves_all_responses():
     assert again.covering(1.9 * one.covers).reduction is wider.reduction
     np.testing.assert_array_equal(one.equation_of_motion()[0], before)
     assert one.rebuilt(system.parameters).reduction is one.reduction
+
+
+def test_a_basis_grows_to_what_the_rule_of_harmonics_may_ask_for():
+    """Events of stiff contacts may need all of its 127 harmonics, where 15 were expected."""
+    system = beam(40)
+    linear = so.condense(system, 2.6)
+    wide = linear.covering(127.5 / 15.5 * linear.covers)
+    top = 127.5 * 2.6
+    np.testing.assert_allclose(
+        1.0 / wide.stiffness(np.array([top]))[0, 0, 0],
+        reduction.exact_flexibility(system, linear.reduction.directions, top, system.parameters)[0, 0],
+        rtol=1e-8,
+    )

@@ -23,6 +23,7 @@ class EndReason(StrEnum):
     STEP_TOO_SMALL = "step too small"
     MAX_POINTS = "max points"
     ASTRAY = "astray"  # it goes round and round without passing its start
+    FAILED = "failed"  # something of a point could not be computed
     NO_MEANING = "no meaning"  # what it consists of can no longer be told from other motions
     CUT = "cut"  # a part of a longer curve
     INTERRUPTED = "interrupted"
@@ -37,6 +38,7 @@ _EARLY = {
     EndReason.STEP_TOO_SMALL,
     EndReason.MAX_POINTS,
     EndReason.ASTRAY,
+    EndReason.FAILED,
     EndReason.NO_MEANING,
     EndReason.INTERRUPTED,
     EndReason.TIME_LIMIT,
@@ -57,6 +59,7 @@ _SENTENCES = {
         "came back to {where} without having passed its start: where two branches nearly touch it went over to another "
         "one. Try a smaller max_step"
     ),
+    EndReason.FAILED: "what follows {where} could not be computed: {detail}; what was computed is kept",
     EndReason.INTERRUPTED: "interrupted at {where}; what was computed is kept",
     EndReason.TIME_LIMIT: "the time limit of {seconds:g} s was reached at {where}; what was computed is kept",
 }

@@ -77,6 +77,11 @@ class Driver(ABC):
             self._interrupted()
             where = self.previous.where if self.previous else "the start"
             trace.ends(Ending.stopped(Interruption.of(cause), where))
+        except ConvergenceError as failure:
+            if self.previous is None:
+                raise
+            self._interrupted()
+            trace.ends(Ending(EndReason.FAILED, self.previous.where, str(failure)))
         self._finish()
         if trace.closed:
             _drop_seam(trace.bifurcations)

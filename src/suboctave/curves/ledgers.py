@@ -118,8 +118,8 @@ def pair_in(stretch: Stretch, newton: NewtonOptions) -> list[tuple[Located, Samp
         basis = max(bases or [next_harmonics(present, rule)], key=lambda basis: basis.harmonics)
         if basis.harmonics <= present.basis.harmonics:
             break
-        curve, _ = curve.finer(present, basis)
         try:
+            curve, _ = curve.finer(present, basis)
             first, middle, last = (solved_in(curve, s, newton) for s in samples)
         except ConvergenceError:
             break

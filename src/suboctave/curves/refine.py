@@ -151,8 +151,11 @@ def _with_more_harmonics(located: Located, a: Sample, b: Sample) -> Singular | N
         basis = next_harmonics(state, curve.adaptive)
         if basis.size <= state.basis.size:
             break
-        wide, state = curve.finer(state, basis)
         kind, sample = located.kind, located.sample
+        try:
+            wide, state = curve.finer(state, basis)
+        except ConvergenceError:
+            break
         try:
             guess = Guess(state, curve.name, curve.span, kind.kappa(sample))
             solution = kind.solve(guess)
@@ -196,9 +199,9 @@ def _refined(
             basis = next_harmonics(state, adaptive)
         if basis.size <= state.basis.size:
             break
-        wide, start = curve.finer(state, basis)
-        guess = replace(_guess_from(solution, curve, size), state=start)
         try:
+            wide, start = curve.finer(state, basis)
+            guess = replace(_guess_from(solution, curve, size), state=start)
             better = solve_or_behind(kind, guess)
             # beside a young contact Newton's method may run to the next bifurcation of the kind
             if neighbours is not None and not _lies_between(better, wide, *neighbours):

@@ -54,8 +54,8 @@ _DEPENDENT = 1e-9
 _ROUNDING, _BESIDE = 1e-12, 1e-9
 #: growth of the highest frequency that a basis is made for, when motions go beyond it
 _BEYOND = 1.5
-#: and beyond which it is no motion of interest
-_TOO_FAR = 8.0
+#: and beyond which it is no motion of interest: adaptive harmonics go from 15 to 127, and a range may be left
+_TOO_FAR = 20.0
 
 
 class Blocks(NamedTuple):
