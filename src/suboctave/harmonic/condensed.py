@@ -1,10 +1,12 @@
 """A linear part whose unknowns are the displacements along the directions that forces act on, and no others.
 
 Of a structure of any size, as it is or projected (`reduction`), nothing but the displacements q along the m directions
-of its elements and loads need be unknown: all else follows from them. With static modes E (`D E = 1`, a unit of one
-displacement, none of the others) and vibrations N of the structure held there (`D N = 0`), `y = E q + N z`,
+of its elements need be unknown: all else follows from them. With static modes E (`D E = 1`, a unit of one displacement,
+none of the others) and vibrations N of the structure held there (`D N = 0`), `y = E q + N z`, elements' forces s and
+loads f anywhere,
 
-    Z_qq q + Z_qz z = -s,    Z_zq q + Z_zz z = 0,        A = Z_qq - Z_qz Z_zz^-1 Z_zq,    A q + s = 0.
+    Z_qq q + Z_qz z = E^T f - s,    Z_zq q + Z_zz z = N^T f,        A q + s = P,
+    A = Z_qq - Z_qz Z_zz^-1 Z_zq,   P = (E^T - Z_qz Z_zz^-1 N^T) f.
 
 These are the coordinates of Craig & Bampton (AIAA Journal 6 (1968) 1313-1319); for damping in proportion to mass and
 stiffness `Z_zz` is diagonal. A is exactly the inverse of the dynamic flexibility at q, but no difference of large
@@ -18,6 +20,7 @@ the square of a modulus: the signs of determinants that bifurcations are told by
 from __future__ import annotations
 
 import copy
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -167,7 +170,9 @@ class Condensed:
     `size` unknowns, `covers` the highest circular frequency that its basis is made for.
     """
 
-    def __init__(self, reduction: Reduction, values: Mapping[str, float]) -> None:
+    def __init__(self, reduction: Reduction, values: Mapping[str, float], held: tuple[int, ...] = ()) -> None:
+        #: degrees of freedom that are unknowns though no element may act on them
+        self.held = held
         self.reduction, self.projected, self.values = reduction, reduction.projected, dict(values)
         self.system = reduction.system
         self.size = len(reduction.directions)
@@ -179,13 +184,15 @@ class Condensed:
         self._last: tuple[NDArray[Any], tuple[Blocks, ComplexArray, ComplexArray]] | None = None
         #: M, C, K, S, (4, r, r)
         self._matrices = np.array([matrix.value(values) for matrix in self.projected.matrices])
+        self._loads = self.seen(reduction.loads)
 
     @property
     def made_for(self) -> dict[str, Any] | None:
         """What its basis is made for, arguments of `linear_part_of`; None where it depends on none."""
         if self.projected.shapes is None:
             return None
-        return {"frequency": self.covers, "scale": self.reduction.scale, "observed": list(self.reduction.observed)}
+        made = {"frequency": self.covers, "scale": self.reduction.scale, "observed": list(self.reduction.observed)}
+        return {**made, "held": list(self.held)} if self.held else made
 
     @property
     def error(self) -> float:
@@ -215,7 +222,7 @@ class Condensed:
     def rebuilt(self, values: Mapping[str, float]) -> Condensed:
         """The same part at other parameter values."""
         if self._other is None or self._other.values != values:
-            self._other = Condensed(self.reduction.covering(self.covers, values), values)
+            self._other = Condensed(self.reduction.covering(self.covers, values), values, self.held)
         return self._other
 
     def covering(self, frequency: float) -> Condensed:
@@ -231,7 +238,7 @@ class Condensed:
             wide = self.covers
             while wide < frequency:
                 wide *= _BEYOND
-            self._wider = Condensed(self.reduction.covering(wide, self.values), self.values)
+            self._wider = Condensed(self.reduction.covering(wide, self.values), self.values, self.held)
         return self._wider
 
     # -------------------------------------------------------------------------------------------------- coordinates
@@ -318,15 +325,34 @@ class Condensed:
 
     def _sides(
         self, frequency: NDArray[Any], names: tuple[str, ...], order: int
-    ) -> tuple[ComplexArray, ComplexArray] | None:
-        """`(Z_qz - left^T Z_zz)^T` and `Z_zq - Z_zz right` of Z differentiated; None for zero."""
+    ) -> tuple[ComplexArray, ComplexArray, Blocks] | None:
+        """`(Z_qz - left^T Z_zz)^T` and `Z_zq - Z_zz right` of Z differentiated, and that; None for zero."""
         _, right, left = self._eliminated(frequency)
         stack = self._stack(names)
         if stack is None:
             return None
         change = stack.at(frequency, order)
         turned = change.transposed()
-        return turned.zq - turned.inner(left), change.zq - change.inner(right)
+        return turned.zq - turned.inner(left), change.zq - change.inner(right), change
+
+    def loaded(self, frequency: Array, names: tuple[str, ...] = (), order: int = 0) -> ComplexArray | None:
+        """See `LinearPart.loaded`."""
+        whole, _, left = self._eliminated(frequency)
+        static, free = self._coordinates.static, self._coordinates.free
+        inner = (free.T @ self._loads.T).astype(complex)
+        by = [*(((name,), 0) for name in names), *(((), 1),) * order]
+        if not by:
+            return np.asarray(static.T @ self._loads.T - _transposed(left) @ inner, dtype=complex)
+        moving = whole.solved(np.broadcast_to(inner, (len(frequency), *inner.shape)))
+        total: ComplexArray | None = None
+        if (both := self._sides(frequency, names, order)) is not None:
+            total = -(_transposed(both[0]) @ moving)
+        for one, other in itertools.permutations(by, 2):
+            before, behind = self._sides(frequency, *one), self._sides(frequency, *other)
+            if before is not None and behind is not None:
+                part = _transposed(before[0]) @ whole.solved(behind[2].inner(moving))
+                total = part if total is None else total + part
+        return total
 
     @lazy
     def _symmetric(self) -> bool:
@@ -367,6 +393,17 @@ class Condensed:
         """See `LinearPart.retain`."""
         return coordinates_among(self.reduction.directions, direction)
 
+    def holds(self, direction: Array) -> bool:
+        """See `LinearPart.holds`."""
+        return _is_among(self.reduction.directions, direction)
+
+    def holding(self, dof: int) -> LinearPart:
+        """The same part with the displacement of a degree of freedom among its unknowns."""
+        if self.holds(np.eye(1, self.system.n, dof)[0]):
+            return self
+        made_for = self.made_for or {}
+        return linear_part_of(self.system, self.values, **{**made_for, "held": [*self.held, dof]})
+
     def equation_of_motion(self) -> tuple[Array, Array, Array]:
         """M, C, K of the structure in its basis, C with what stands for structural damping."""
         return self._equation
@@ -396,11 +433,14 @@ class Condensed:
         shapes = self.projected.shapes
         return motion if shapes is None else motion @ shapes.T
 
-    def recovered(self, frequency: Array, amplitudes: ComplexArray) -> ComplexArray:
+    def recovered(self, frequency: Array, amplitudes: ComplexArray, loads: ComplexArray | None = None) -> ComplexArray:
         """See `LinearPart.recovered`."""
+        whole, right, _ = self._eliminated(frequency)
         static, free = self._coordinates.static, self._coordinates.free
-        inner = (self._eliminated(frequency)[1] @ amplitudes[:, :, None])[:, :, 0]
-        result: ComplexArray = amplitudes @ static.T - inner @ free.T
+        inner = right @ amplitudes[:, :, None]
+        if loads is not None and len(self._loads):
+            inner -= whole.solved((loads @ (self._loads @ free))[:, :, None])
+        result: ComplexArray = amplitudes @ static.T - inner[:, :, 0] @ free.T
         return result
 
 
@@ -417,20 +457,25 @@ def linear_part_of(
     frequency: float = 1.0,
     scale: float | None = None,
     observed: Sequence[int] = (),
+    held: Sequence[int] = (),
 ) -> LinearPart:
-    """The linear part of a system with the fewest unknowns: condensed where forces leave degrees of freedom alone.
+    """The linear part of a system with the fewest unknowns: condensed where elements leave degrees of freedom alone.
 
     frequency: the highest circular frequency of interest, which decides how a large structure is projected; scale: one
-    within the range of interest; observed: degrees of freedom whose motion it should give as exactly.
+    within the range of interest; observed: degrees of freedom whose motion it should give as exactly; held: those that
+    should be unknowns.
     """
-    at = system.parameters if values is None else values
-    directions = acting(system)
-    if len(directions) in (0, system.n):
+    at, n = system.parameters if values is None else values, system.n
+    directions = unknown_directions(system, held)
+    if len(directions) in (0, n):
         return StructuralMatrices(system, at)
-    units = [np.eye(1, system.n, dof)[0] for dof in observed]
-    served = independent([*directions, *units])
+    components = [c.direction for c in system.load_components()]
+    loads = np.reshape([d for d in components if not _is_among(directions, d)], (-1, n))
+    units = [np.eye(1, n, dof)[0] for dof in observed]
+    served = independent([*directions, *loads, *units])
     unit = frequency / 16.0 if scale is None else scale
-    return Condensed(Reduction.of(system, directions, served, tuple(observed), unit, frequency, at), at)
+    reduction = Reduction.of(system, directions, loads, served, tuple(observed), unit, frequency, at)
+    return Condensed(reduction, at, tuple(held))
 
 
 def condense(
@@ -462,12 +507,21 @@ def condense(
     return linear_part_of(system, None, (check_count("harmonics", harmonics) + 0.5) * highest, None, chosen)
 
 
-def acting(system: System) -> Array:
-    """Independent directions (m, n) that elements read and act along and loads act along, in the order met."""
+def unknown_directions(system: System, held: Sequence[int] = ()) -> Array:
+    """Independent directions (m, n) that displacements are unknown along: those that elements read and act along, and
+    of degrees of freedom `held`, in the order met; without any those that loads act along.
+    """
     n = system.n
     rows = [d for e in system.elements for d in (*e.inputs(n), e.direction(n))]
-    rows += [c.direction for c in system.load_components()]
-    return independent(rows).reshape(-1, n)
+    rows += [np.eye(1, n, dof)[0] for dof in held]
+    return independent(rows or [c.direction for c in system.load_components()]).reshape(-1, n)
+
+
+def acting(system: System) -> Array:
+    """Independent directions (m, n) that elements read and act along and loads act along, in the order met."""
+    return independent([*unknown_directions(system), *(c.direction for c in system.load_components())]).reshape(
+        -1, system.n
+    )
 
 
 def independent(rows: Sequence[Array]) -> Array:
@@ -491,9 +545,19 @@ def independent(rows: Sequence[Array]) -> Array:
 
 def coordinates_among(directions: Array, direction: Array) -> Array:
     """c with `direction = c @ directions`; InputError if it is not among them."""
+    if not _is_among(directions, direction):
+        raise InputError("this direction is not among those that displacements are unknown along")
+    return _nearest(directions, direction)
+
+
+def _nearest(directions: Array, direction: Array) -> Array:
     square, pulled = directions @ directions.T, directions @ direction
     c = np.asarray(np.linalg.solve(square, pulled), dtype=float)
     c[np.abs(c) <= 1e-14 * np.abs(c).max(initial=0.0)] = 0.0
-    if np.linalg.norm(direction - c @ directions) > 10.0 * _DEPENDENT * np.linalg.norm(direction):
-        raise InputError("this direction is not among those that elements and loads act along")
     return c
+
+
+def _is_among(directions: Array, direction: Array) -> bool:
+    """Whether a direction depends on others."""
+    rest = direction - _nearest(directions, direction) @ directions
+    return bool(np.linalg.norm(rest) <= 10.0 * _DEPENDENT * np.linalg.norm(direction))
