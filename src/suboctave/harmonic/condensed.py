@@ -20,7 +20,6 @@ the square of a modulus: the signs of determinants that bifurcations are told by
 from __future__ import annotations
 
 import copy
-import itertools
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -62,8 +61,8 @@ _TOO_FAR = 20.0
 
 
 class Blocks(NamedTuple):
-    """A matrix in the coordinates (q, z), a stack of one per frequency: qq (F, m, m), qz (F, m, s), zq (F, s, m) and
-    zz (F, s, s), or its diagonal (F, s).
+    """A matrix in the coordinates (q, z) with the loads' columns behind those of q, a stack of one per frequency: qq
+    (F, m, m + l), qz (F, m, s), zq (F, s, m + l) and zz (F, s, s), or its diagonal (F, s).
     """
 
     qq: ComplexArray
@@ -81,17 +80,19 @@ class Blocks(NamedTuple):
             return vectors / self.zz[:, :, None]
         return np.asarray(np.linalg.solve(self.zz, vectors), dtype=complex)
 
-    def transposed(self) -> Blocks:
-        """Of the transposed matrices."""
-        zz = self.zz if self.zz.ndim == 2 else _transposed(self.zz)
-        return Blocks(_transposed(self.qq), _transposed(self.zq), _transposed(self.qz), zz)
+    def across(self, left: ComplexArray) -> ComplexArray:
+        """`(Z_qz - left^T Z_zz)^T`."""
+        inner = self.zz[:, :, None] * left if self.zz.ndim == 2 else _transposed(self.zz) @ left
+        return _transposed(self.qz) - inner
 
 
 class Stack(NamedTuple):
-    """M, C, K, S in the coordinates (q, z), all entries in a row, (4, .); how many q and z; if zz is a diagonal."""
+    """M, C, K, S in the coordinates (q, z) with loads' columns, all entries in a row, (4, .); how many q, z and columns
+    with those of q; if zz is a diagonal.
+    """
 
     entries: Array
-    sizes: tuple[int, int]
+    sizes: tuple[int, int, int]
     diagonal: bool
 
     @classmethod
@@ -101,24 +102,26 @@ class Stack(NamedTuple):
         if diagonal:
             parts = [(*part[:3], part[3].diagonal()) for part in parts]
         rows = [np.concatenate([one.ravel() for one in part]) for part in parts]
-        return cls(np.array(rows), parts[0][1].shape, diagonal)
+        return cls(np.array(rows), (*parts[0][1].shape, parts[0][0].shape[1]), diagonal)
 
     def at(self, frequency: NDArray[Any], order: int) -> Blocks:
         """The dynamic stiffness at frequencies, differentiated by Omega."""
-        (m, s), count = self.sizes, len(frequency)
+        (m, s, columns), count = self.sizes, len(frequency)
         values = entries_at(self.entries, frequency, order)
-        a, b, c = m * m, m * m + m * s, m * m + 2 * m * s
+        a = m * columns
+        b = a + m * s
+        c = b + s * columns
         inner = values[:, c:] if self.diagonal else values[:, c:].reshape(count, s, s)
         return Blocks(
-            values[:, :a].reshape(count, m, m),
+            values[:, :a].reshape(count, m, columns),
             values[:, a:b].reshape(count, m, s),
-            values[:, b:c].reshape(count, s, m),
+            values[:, b:c].reshape(count, s, columns),
             inner,
         )
 
     def between(self, frequency: NDArray[Any], order: int, left: ComplexArray, right: ComplexArray) -> ComplexArray:
-        """`[1 -left^T] Z [1; -right]` of that, (F, m, m); left, right (F, s, m)."""
-        out = np.empty((len(frequency), self.sizes[0], self.sizes[0]), dtype=complex)
+        """`[1 -left^T] Z [1; -right]` of that, (F, m, m + l); left (F, s, m), right (F, s, m + l)."""
+        out = np.empty((len(frequency), self.sizes[0], self.sizes[2]), dtype=complex)
         between(self.entries, self.diagonal, frequency.astype(complex), order, left, right, out)
         return out
 
@@ -126,25 +129,27 @@ class Stack(NamedTuple):
 @kernel(fastmath={"contract"})
 def between(entries, diagonal, frequency, order, left, right, out):
     """See `Stack`, `Stack.between`."""
-    s, m = right.shape[1:]
-    across, back, inner = m * m, m * m + m * s, m * m + 2 * m * s
-    z, moved = np.empty(entries.shape[1], dtype=np.complex128), np.empty(m, dtype=np.complex128)
+    (s, columns), m = right.shape[1:], left.shape[2]
+    across = m * columns
+    back = across + m * s
+    inner = back + s * columns
+    z, moved = np.empty(entries.shape[1], dtype=np.complex128), np.empty(columns, dtype=np.complex128)
     for f in range(frequency.shape[0]):
         by = factors(frequency[f], order)
         for i in range(len(z)):
             z[i] = by[0] * entries[0, i] + by[1] * entries[1, i] + by[2] * entries[2, i] + by[3] * entries[3, i]
         for i in range(m):
-            for j in range(m):
-                out[f, i, j] = z[i * m + j]
+            for j in range(columns):
+                out[f, i, j] = z[i * columns + j]
         for k in range(s):
-            for j in range(m):
-                moved[j] = z[back + k * m + j]
+            for j in range(columns):
+                moved[j] = z[back + k * columns + j]
             for l in range(k if diagonal else 0, k + 1 if diagonal else s):
                 own = z[inner + k] if diagonal else z[inner + k * s + l]
-                for j in range(m):
+                for j in range(columns):
                     moved[j] -= own * right[f, l, j]
             for i in range(m):
-                for j in range(m):
+                for j in range(columns):
                     out[f, i, j] -= z[across + i * s + k] * right[f, k, j] + left[f, k, i] * moved[j]
 
 
@@ -181,7 +186,7 @@ class Condensed:
         self._other: Condensed | None = None
         self._wider: Condensed | None = None
         #: what was asked for last, by frequencies
-        self._last: tuple[NDArray[Any], tuple[Blocks, ComplexArray, ComplexArray]] | None = None
+        self._last: tuple[NDArray[Any], tuple[Blocks, ComplexArray, ComplexArray], dict[Any, Any]] | None = None
         #: M, C, K, S, (4, r, r)
         self._matrices = np.array([matrix.value(values) for matrix in self.projected.matrices])
         self._loads = self.seen(reduction.loads)
@@ -261,27 +266,32 @@ class Condensed:
         squares, turn = eigh((null * values[:, None]).T @ null) if null.shape[1] else (np.zeros(0), np.zeros((0, 0)))
         return Coordinates(static, modes @ (null @ turn), squares, unit, held)
 
-    def _split(self, matrices: Array) -> list[tuple[Array, Array, Array, Array]]:
-        """Matrices (., r, r) in the coordinates (q, z), each as qq, qz, zq, zz."""
+    def _split(self, matrices: Array) -> list[tuple[Array, ...]]:
+        """Matrices (., r, r) in the coordinates (q, z), each as qq, qz, zq, zz, with nothing in the loads' columns."""
         left = np.concatenate((self._coordinates.static, self._coordinates.free), axis=1).T
-        m, parts = self.size, []
+        m, none = self.size, np.zeros((len(left), len(self._loads)))
+        parts: list[tuple[Array, ...]] = []
         for matrix in matrices:
             whole = left @ matrix @ left.T
-            parts.append((whole[:m, :m], whole[:m, m:], whole[m:, :m], whole[m:, m:]))
+            beside = np.concatenate((whole[:, :m], none), axis=1)
+            parts.append((beside[:m], whole[:m, m:], beside[m:], whole[m:, m:]))
         return parts
 
     @lazy
     def _own(self) -> Stack:
         """M, C, K, S in the coordinates (q, z)."""
-        _, _, squares, unit, held = self._coordinates
-        mass, damping, _, structural = self._split(self._matrices)
-        k = self._matrices[2]
-        skew = self._split(0.5 * (k - k.T)[None])[0]
+        static, free, squares, unit, held = self._coordinates
+        m, k = self.size, self._matrices[2]
+        mass, damping, skew, structural = self._split(
+            np.array([*self._matrices[:2], 0.5 * (k - k.T), self._matrices[3]])
+        )
         # K = S - unit M, and S has no coupling
-        whole = (held - unit * mass[0], -unit * mass[1], -unit * mass[2], np.diag(squares))
-        mass = (*mass[:3], np.eye(len(squares)))
-        stiffness = tuple(one + other for one, other in zip(whole, skew, strict=True))
-        return Stack.of([mass, damping, stiffness, structural])
+        qq, qz, zq = (one - unit * other for one, other in zip(skew[:3], mass[:3], strict=True))
+        qq[:, :m] += held
+        # loads act at all frequencies alike
+        qq[:, m:], zq[:, m:] = static.T @ self._loads.T, free.T @ self._loads.T
+        stiffness = qq, qz, zq, np.diag(squares) + skew[3]
+        return Stack.of([(*mass[:3], np.eye(len(squares))), damping, stiffness, structural])
 
     # ------------------------------------------------------------------------------------------------------- blocks
     def _stack(self, names: tuple[str, ...]) -> Stack | None:
@@ -295,18 +305,35 @@ class Condensed:
         """Z at frequencies, `Z_zz^-1 Z_zq`, and the transpose of `Z_qz Z_zz^-1`; what was asked for last is kept."""
         if self._last is None or self._last[0] is not frequency:
             whole = self._own.at(frequency, 0)
-            left = right = whole.solved(whole.zq)
+            right = whole.solved(whole.zq)
+            left = right if right.shape[2] == self.size else np.ascontiguousarray(right[:, :, : self.size])
             if not self._symmetric:
-                turned = whole.transposed()
-                left = np.ascontiguousarray(turned.solved(turned.zq))
-            self._last = frequency, (whole, right, left)
+                turned = whole._replace(zz=whole.zz if whole.zz.ndim == 2 else _transposed(whole.zz))
+                left = np.ascontiguousarray(turned.solved(_transposed(whole.qz)))
+            self._last = frequency, (whole, right, left), {}
         return self._last[1]
 
     def _differentiated(
         self, frequency: NDArray[Any], by: tuple[tuple[tuple[str, ...], int], ...]
     ) -> ComplexArray | None:
-        """A, differentiated by at most two things: each some names, or none and an order in Omega of one."""
+        """A and P of unit loads, (F, m, m + l), differentiated by at most two things: each some names, or none and an
+        order in Omega of one.
+        """
         whole, right, left = self._eliminated(frequency)
+        assert self._last is not None
+        known = self._last[2]
+        if by not in known:
+            known[by] = self._made(frequency, by, whole, right, left)
+        return known[by]
+
+    def _made(
+        self,
+        frequency: NDArray[Any],
+        by: tuple[tuple[tuple[str, ...], int], ...],
+        whole: Blocks,
+        right: ComplexArray,
+        left: ComplexArray,
+    ) -> ComplexArray | None:
         if not by:
             return np.ascontiguousarray(whole.qq - whole.qz @ right)
         total = self._stack(tuple(name for one, _ in by for name in one))
@@ -325,34 +352,14 @@ class Condensed:
 
     def _sides(
         self, frequency: NDArray[Any], names: tuple[str, ...], order: int
-    ) -> tuple[ComplexArray, ComplexArray, Blocks] | None:
-        """`(Z_qz - left^T Z_zz)^T` and `Z_zq - Z_zz right` of Z differentiated, and that; None for zero."""
+    ) -> tuple[ComplexArray, ComplexArray] | None:
+        """`(Z_qz - left^T Z_zz)^T` and `Z_zq - Z_zz right` of Z differentiated; None for zero."""
         _, right, left = self._eliminated(frequency)
         stack = self._stack(names)
         if stack is None:
             return None
         change = stack.at(frequency, order)
-        turned = change.transposed()
-        return turned.zq - turned.inner(left), change.zq - change.inner(right), change
-
-    def loaded(self, frequency: Array, names: tuple[str, ...] = (), order: int = 0) -> ComplexArray | None:
-        """See `LinearPart.loaded`."""
-        whole, _, left = self._eliminated(frequency)
-        static, free = self._coordinates.static, self._coordinates.free
-        inner = (free.T @ self._loads.T).astype(complex)
-        by = [*(((name,), 0) for name in names), *(((), 1),) * order]
-        if not by:
-            return np.asarray(static.T @ self._loads.T - _transposed(left) @ inner, dtype=complex)
-        moving = whole.solved(np.broadcast_to(inner, (len(frequency), *inner.shape)))
-        total: ComplexArray | None = None
-        if (both := self._sides(frequency, names, order)) is not None:
-            total = -(_transposed(both[0]) @ moving)
-        for one, other in itertools.permutations(by, 2):
-            before, behind = self._sides(frequency, *one), self._sides(frequency, *other)
-            if before is not None and behind is not None:
-                part = _transposed(before[0]) @ whole.solved(behind[2].inner(moving))
-                total = part if total is None else total + part
-        return total
+        return change.across(left), change.zq - change.inner(right)
 
     @lazy
     def _symmetric(self) -> bool:
@@ -371,23 +378,32 @@ class Condensed:
     def feeding(self, frequency: Array) -> ComplexArray:
         """See `LinearPart.feeding`."""
         _, right, left = self._eliminated(frequency)
-        return self._feeding.between(frequency, 0, left, right)
+        return self._unknowns_alone(self._feeding.between(frequency, 0, left, right))
 
     @lazy
     def _feeding(self) -> Stack:
         return self._own._replace(entries=feeding_matrices(self._own.entries))
+
+    def _unknowns_alone(self, whole: ComplexArray) -> ComplexArray:
+        """Without the loads' columns."""
+        return whole if whole.shape[2] == self.size else np.ascontiguousarray(whole[:, :, : self.size])
 
     # ----------------------------------------------------------------------------------------------------- contract
     def stiffness(self, frequency: NDArray[Any], order: int = 0) -> ComplexArray:
         """See `LinearPart.stiffness`."""
         result = self._differentiated(frequency, (((), 1),) * order)
         assert result is not None
-        return result
+        return self._unknowns_alone(result)
 
     def stiffness_by(self, frequency: Array, names: tuple[str, ...], order: int = 0) -> ComplexArray | None:
         """See `LinearPart.stiffness_by`."""
-        by = (*(((name,), 0) for name in names), *(((), 1),) * order)
-        return self._differentiated(frequency, by)
+        result = self._differentiated(frequency, (*(((name,), 0) for name in names), *(((), 1),) * order))
+        return None if result is None else self._unknowns_alone(result)
+
+    def loaded(self, frequency: Array, names: tuple[str, ...] = (), order: int = 0) -> ComplexArray | None:
+        """See `LinearPart.loaded`."""
+        result = self._differentiated(frequency, (*(((name,), 0) for name in names), *(((), 1),) * order))
+        return None if result is None else result[:, :, self.size :]
 
     def retain(self, direction: Array) -> Array:
         """See `LinearPart.retain`."""
@@ -435,12 +451,13 @@ class Condensed:
 
     def recovered(self, frequency: Array, amplitudes: ComplexArray, loads: ComplexArray | None = None) -> ComplexArray:
         """See `LinearPart.recovered`."""
-        whole, right, _ = self._eliminated(frequency)
         static, free = self._coordinates.static, self._coordinates.free
-        inner = right @ amplitudes[:, :, None]
-        if loads is not None and len(self._loads):
-            inner -= whole.solved((loads @ (self._loads @ free))[:, :, None])
-        result: ComplexArray = amplitudes @ static.T - inner[:, :, 0] @ free.T
+        columns = amplitudes
+        if len(self._loads):
+            none = np.zeros((len(amplitudes), len(self._loads)))
+            columns = np.concatenate((amplitudes, none if loads is None else -loads), axis=1)
+        inner = (self._eliminated(frequency)[1] @ columns[:, :, None])[:, :, 0]
+        result: ComplexArray = amplitudes @ static.T - inner @ free.T
         return result
 
 

@@ -147,8 +147,8 @@ class Equations:
 
     @property
     def steady(self) -> bool:
-        """Whether the unbalanced force depends on omega through the motion's frequency alone, and not at fixed X."""
-        return not (self.any_moving or self.own or "omega" in self.load_names)
+        """Whether the forces of the elements do not depend on omega at fixed X."""
+        return not (self.any_moving or self.own)
 
     def with_samples(self: _Same, samples: tuple[int | None, ...]) -> _Same:
         """The same equations with other frozen sample counts."""

@@ -64,8 +64,8 @@ class LinearPart(Protocol):
         """The same part with the displacement of a DOF among its unknowns."""
 
     def loaded(self, frequency: Array, names: tuple[str, ...] = (), order: int = 0) -> ComplexArray | None:
-        """P of a unit of each of the system's loads whose directions the unknowns do not hold, (F, size, loads), `d^order
-        / d Omega^order` of it, differentiated by parameters, by two things at most; None if zero.
+        """P of a unit of each of the loads whose directions the unknowns do not hold, (F, size, loads), or `d^order / d
+        Omega^order` of it, differentiated by parameters, by two things at most; None if zero.
         """
 
     def equation_of_motion(self) -> tuple[Array, Array, Array]:
