@@ -31,12 +31,12 @@ _CORRECTIONS, _STILL = 50, 1e-13
 
 
 def at_rest(balance: HarmonicBalance, omega: float, values: Mapping[str, float]) -> BalanceState:
-    """The system at rest under its constant loads, as a motion with one harmonic; ConvergenceError where none is found.
+    """The system at rest under its constant loads, as a motion; ConvergenceError where none is found.
 
     `omega` is the frequency that loads may depend on.
     """
     n = balance.size
-    balance = balance.with_basis(HarmonicBasis(1))
+    balance = balance.with_basis(HarmonicBasis(max(1, balance.highest_load)))
     x = np.zeros((balance.basis.size, n))
     for _ in range(_CORRECTIONS):
         state = balance.at(x, omega, values)
