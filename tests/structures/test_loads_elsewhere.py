@@ -101,7 +101,7 @@ def test_sensitivities(pair):
         assert one[name] == pytest.approx(other[name], rel=1e-6)
 
 
-@pytest.mark.parametrize("dof", [1, 2])
+@pytest.mark.parametrize("dof", [1, 3])
 def test_peaks_where_no_element_acts(dof):
     """The observed degree of freedom becomes an unknown for its peak to be followed."""
     system = chain(gap=2.0)
@@ -113,6 +113,7 @@ def test_peaks_where_no_element_acts(dof):
         )
     ]
     assert curves[0].orbits[0].balance.size == 2
+    assert all(curve.observe == dof for curve in curves)
     ends = [(curve.omega[-1], curve.amplitude[-1]) for curve in curves]
     np.testing.assert_allclose(ends[0], ends[1], rtol=1e-7)
 

@@ -1,4 +1,4 @@
-"""A linear part whose unknowns are the displacements along the directions that forces act on, and no others.
+"""A linear part whose unknowns are the displacements along the directions of the elements, and no others.
 
 Of a structure of any size, as it is or projected (`reduction`), nothing but the displacements q along the m directions
 of its elements need be unknown: all else follows from them. With static modes E (`D E = 1`, a unit of one displacement,

@@ -237,7 +237,7 @@ def in_words(linear: LinearPart, dofs: int, how: str, declared: UnitSystem | Non
     units = ((circular, 1.0), (cycles, 2.0 * np.pi))
     shown = [f"{', '.join(f'{w / unit:.6g}' for w in lowest)} {name}" for name, unit in units]
     return (
-        f"Linear part: {dofs} degrees of freedom, {how}; {linear.size} unknown displacements\n"
+        f"Linear part: {dofs} degrees of freedom, {how}; {linear.size} unknown displacement{'s' if linear.size > 1 else ''}\n"
         f"  natural frequencies {shown[0]}\n                      {shown[1]}"
     )
 
