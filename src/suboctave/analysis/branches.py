@@ -382,7 +382,7 @@ def leave_along(item: Bifurcation, curve: MotionProblem, direction: Array, run: 
 def _scale_from_rest(curve: MotionProblem, u: Array, direction: Array) -> None:
     """Where a branch leaves rest nothing says how large a motion is: one whose forces deviate from linear ones."""
     x, omega, values = curve.split(u)
-    if curve.balance.load(values, omega).any():
+    if curve.balance.at(x, omega, values).load.any():
         return
     balance = curve.balance.settle(x, omega, values)
     rest, phi = balance.at(x, omega, values), direction[:-1]

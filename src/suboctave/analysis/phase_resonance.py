@@ -20,7 +20,8 @@ from suboctave.analysis.track import track
 from suboctave.curves.starts import Harmonics
 from suboctave.curves.trace import BranchPoint
 from suboctave.errors import ConvergenceError, InputError
-from suboctave.harmonic.basis import Array, to_complex
+from suboctave.harmonic.basis import Array
+from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.model.inputs import check_bounds, check_count, check_is_system, check_range, timed
 from suboctave.model.system import System
 from suboctave.options import with_options
@@ -98,14 +99,14 @@ def _in_quadrature(branch: Branch, k: int, nu: int) -> list[tuple[float, BranchP
     """Where the phase passes quadrature along a branch: the amplitude of the harmonic, and the point nearest by."""
     orbits = branch.orbits
     z = np.array([orbit.harmonic(k / nu, branch.observe) for orbit in orbits])
-    force = np.array([_load(orbit.balance.load(orbit.values, orbit.omega), nu) for orbit in orbits])
+    force = np.array([_load(orbit) for orbit in orbits])
     lag: Array = (z**nu * force.conj() ** k).real / np.maximum(np.abs(z) ** nu * np.abs(force) ** k, 1e-300)
     passes = np.flatnonzero(lag[:-1] * lag[1:] < 0.0)
     nearer = passes + (np.abs(lag[passes + 1]) < np.abs(lag[passes]))
     return [(float(abs(z[i])), branch.points[i]) for i in nearer.tolist()]
 
 
-def _load(coefficients: Array, nu: int) -> complex:
+def _load(orbit: PeriodicOrbit) -> complex:
     """The largest complex amplitude of the load at omega."""
-    amplitudes = to_complex(coefficients)[nu]
-    return complex(amplitudes[np.argmax(np.abs(amplitudes))])
+    loads, values = orbit.balance.loads, {**orbit.values, "omega": orbit.omega}
+    return loads.force(1, values, loads.strongest(1, values))

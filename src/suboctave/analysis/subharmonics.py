@@ -314,14 +314,13 @@ def _resonant(curve: MotionProblem, frequency: float, shape: Array) -> list[Arra
     single = HarmonicBalance(
         curve.balance.system, HarmonicBasis(5), curve.balance.values, curve.balance.linear, curve.balance.samples
     )
-    load = single.load(single.values, frequency)
 
     def pull(cosines: Array) -> tuple[Array, Array]:
         """What is left of the first harmonic's cosines without loads, and its derivative."""
         x = np.zeros((single.basis.size, single.size))
         x[1] = cosines
         state = single.at(x, frequency)
-        rest = state.residual.reshape(x.shape) + load
+        rest = state.residual.reshape(x.shape) + state.load
         own = slice(single.size, 2 * single.size)
         return rest[1], state.jacobian[own, own]
 

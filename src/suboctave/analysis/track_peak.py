@@ -55,5 +55,7 @@ def track_peak(
             raise InputError("the peak is that of a response over omega: give such a branch, or one of its points")
         heights = response.amplitude if harmonic is None else np.abs(response.harmonic(harmonic))
         start = response.points[int(np.argmax(heights))]
+        if options.get("observe") is None:
+            options["observe"] = response.observe
     onto: Any = "ridge" if harmonic is None else {"name": "harmonic_ridge", "harmonic": harmonic}
     return track(start, parameter, bounds, onto=onto, **options)

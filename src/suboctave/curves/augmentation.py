@@ -75,6 +75,8 @@ class Augmentation(ABC):
     turning: str = ""
     #: whether free parameters count in units of their own values, not of their ranges
     relative: bool = False
+    #: whether the equations read the observed degree of freedom, which is an unknown then
+    reads_observed: bool = False
     #: how many multipliers are critical at a solution; where two real ones are, rounding leaves their mean alone
     trivial: int = 1
 

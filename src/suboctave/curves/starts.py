@@ -128,13 +128,12 @@ _UNBOUNDED = 1e4
 def linear_response(curve: MotionProblem, value: float) -> Array:
     """u of the response without elements, at a value of the free parameter."""
     state = curve.balance.at(*curve.split(curve.join(np.zeros(curve.balance.dimension), value)))
-    load = curve.balance.load(state.values, state.omega)
     try:
         inverse = np.linalg.inv(state.blocks).astype(complex)
     except np.linalg.LinAlgError:
         # a free body or an undamped resonance: the least motion that balances what can be balanced
         inverse = np.linalg.pinv(state.blocks).astype(complex)
-    return curve.join(apply_blocks(inverse, load), value)
+    return curve.join(apply_blocks(inverse, state.load), value)
 
 
 def start_point(curve: MotionProblem, value: float, given: Any, newton: NewtonOptions) -> CurvePoint:

@@ -1,10 +1,12 @@
-"""A linear part whose unknowns are the displacements along the directions that forces act on, and no others.
+"""A linear part whose unknowns are the displacements along the directions of the elements, and no others.
 
 Of a structure of any size, as it is or projected (`reduction`), nothing but the displacements q along the m directions
-of its elements and loads need be unknown: all else follows from them. With static modes E (`D E = 1`, a unit of one
-displacement, none of the others) and vibrations N of the structure held there (`D N = 0`), `y = E q + N z`,
+of its elements need be unknown: all else follows from them. With static modes E (`D E = 1`, a unit of one displacement,
+none of the others) and vibrations N of the structure held there (`D N = 0`), `y = E q + N z`, elements' forces s and
+loads f anywhere,
 
-    Z_qq q + Z_qz z = -s,    Z_zq q + Z_zz z = 0,        A = Z_qq - Z_qz Z_zz^-1 Z_zq,    A q + s = 0.
+    Z_qq q + Z_qz z = E^T f - s,    Z_zq q + Z_zz z = N^T f,        A q + s = P,
+    A = Z_qq - Z_qz Z_zz^-1 Z_zq,   P = (E^T - Z_qz Z_zz^-1 N^T) f.
 
 These are the coordinates of Craig & Bampton (AIAA Journal 6 (1968) 1313-1319); for damping in proportion to mass and
 stiffness `Z_zz` is diagonal. A is exactly the inverse of the dynamic flexibility at q, but no difference of large
@@ -59,8 +61,8 @@ _TOO_FAR = 20.0
 
 
 class Blocks(NamedTuple):
-    """A matrix in the coordinates (q, z), a stack of one per frequency: qq (F, m, m), qz (F, m, s), zq (F, s, m) and
-    zz (F, s, s), or its diagonal (F, s).
+    """A matrix in the coordinates (q, z) with the loads' columns behind those of q, a stack of one per frequency: qq
+    (F, m, m + l), qz (F, m, s), zq (F, s, m + l) and zz (F, s, s), or its diagonal (F, s).
     """
 
     qq: ComplexArray
@@ -78,17 +80,19 @@ class Blocks(NamedTuple):
             return vectors / self.zz[:, :, None]
         return np.asarray(np.linalg.solve(self.zz, vectors), dtype=complex)
 
-    def transposed(self) -> Blocks:
-        """Of the transposed matrices."""
-        zz = self.zz if self.zz.ndim == 2 else _transposed(self.zz)
-        return Blocks(_transposed(self.qq), _transposed(self.zq), _transposed(self.qz), zz)
+    def across(self, left: ComplexArray) -> ComplexArray:
+        """`(Z_qz - left^T Z_zz)^T`."""
+        inner = self.zz[:, :, None] * left if self.zz.ndim == 2 else _transposed(self.zz) @ left
+        return _transposed(self.qz) - inner
 
 
 class Stack(NamedTuple):
-    """M, C, K, S in the coordinates (q, z), all entries in a row, (4, .); how many q and z; if zz is a diagonal."""
+    """M, C, K, S in the coordinates (q, z) with loads' columns, all entries in a row, (4, .); how many q, z and columns
+    with those of q; if zz is a diagonal.
+    """
 
     entries: Array
-    sizes: tuple[int, int]
+    sizes: tuple[int, int, int]
     diagonal: bool
 
     @classmethod
@@ -98,24 +102,26 @@ class Stack(NamedTuple):
         if diagonal:
             parts = [(*part[:3], part[3].diagonal()) for part in parts]
         rows = [np.concatenate([one.ravel() for one in part]) for part in parts]
-        return cls(np.array(rows), parts[0][1].shape, diagonal)
+        return cls(np.array(rows), (*parts[0][1].shape, parts[0][0].shape[1]), diagonal)
 
     def at(self, frequency: NDArray[Any], order: int) -> Blocks:
         """The dynamic stiffness at frequencies, differentiated by Omega."""
-        (m, s), count = self.sizes, len(frequency)
+        (m, s, columns), count = self.sizes, len(frequency)
         values = entries_at(self.entries, frequency, order)
-        a, b, c = m * m, m * m + m * s, m * m + 2 * m * s
+        a = m * columns
+        b = a + m * s
+        c = b + s * columns
         inner = values[:, c:] if self.diagonal else values[:, c:].reshape(count, s, s)
         return Blocks(
-            values[:, :a].reshape(count, m, m),
+            values[:, :a].reshape(count, m, columns),
             values[:, a:b].reshape(count, m, s),
-            values[:, b:c].reshape(count, s, m),
+            values[:, b:c].reshape(count, s, columns),
             inner,
         )
 
     def between(self, frequency: NDArray[Any], order: int, left: ComplexArray, right: ComplexArray) -> ComplexArray:
-        """`[1 -left^T] Z [1; -right]` of that, (F, m, m); left, right (F, s, m)."""
-        out = np.empty((len(frequency), self.sizes[0], self.sizes[0]), dtype=complex)
+        """`[1 -left^T] Z [1; -right]` of that, (F, m, m + l); left (F, s, m), right (F, s, m + l)."""
+        out = np.empty((len(frequency), self.sizes[0], self.sizes[2]), dtype=complex)
         between(self.entries, self.diagonal, frequency.astype(complex), order, left, right, out)
         return out
 
@@ -123,25 +129,27 @@ class Stack(NamedTuple):
 @kernel(fastmath={"contract"})
 def between(entries, diagonal, frequency, order, left, right, out):
     """See `Stack`, `Stack.between`."""
-    s, m = right.shape[1:]
-    across, back, inner = m * m, m * m + m * s, m * m + 2 * m * s
-    z, moved = np.empty(entries.shape[1], dtype=np.complex128), np.empty(m, dtype=np.complex128)
+    (s, columns), m = right.shape[1:], left.shape[2]
+    across = m * columns
+    back = across + m * s
+    inner = back + s * columns
+    z, moved = np.empty(entries.shape[1], dtype=np.complex128), np.empty(columns, dtype=np.complex128)
     for f in range(frequency.shape[0]):
         by = factors(frequency[f], order)
         for i in range(len(z)):
             z[i] = by[0] * entries[0, i] + by[1] * entries[1, i] + by[2] * entries[2, i] + by[3] * entries[3, i]
         for i in range(m):
-            for j in range(m):
-                out[f, i, j] = z[i * m + j]
+            for j in range(columns):
+                out[f, i, j] = z[i * columns + j]
         for k in range(s):
-            for j in range(m):
-                moved[j] = z[back + k * m + j]
+            for j in range(columns):
+                moved[j] = z[back + k * columns + j]
             for l in range(k if diagonal else 0, k + 1 if diagonal else s):
                 own = z[inner + k] if diagonal else z[inner + k * s + l]
-                for j in range(m):
+                for j in range(columns):
                     moved[j] -= own * right[f, l, j]
             for i in range(m):
-                for j in range(m):
+                for j in range(columns):
                     out[f, i, j] -= z[across + i * s + k] * right[f, k, j] + left[f, k, i] * moved[j]
 
 
@@ -167,7 +175,9 @@ class Condensed:
     `size` unknowns, `covers` the highest circular frequency that its basis is made for.
     """
 
-    def __init__(self, reduction: Reduction, values: Mapping[str, float]) -> None:
+    def __init__(self, reduction: Reduction, values: Mapping[str, float], held: tuple[int, ...] = ()) -> None:
+        #: degrees of freedom that are unknowns though no element may act on them
+        self.held = held
         self.reduction, self.projected, self.values = reduction, reduction.projected, dict(values)
         self.system = reduction.system
         self.size = len(reduction.directions)
@@ -176,16 +186,18 @@ class Condensed:
         self._other: Condensed | None = None
         self._wider: Condensed | None = None
         #: what was asked for last, by frequencies
-        self._last: tuple[NDArray[Any], tuple[Blocks, ComplexArray, ComplexArray]] | None = None
+        self._last: tuple[NDArray[Any], tuple[Blocks, ComplexArray, ComplexArray], dict[Any, Any]] | None = None
         #: M, C, K, S, (4, r, r)
         self._matrices = np.array([matrix.value(values) for matrix in self.projected.matrices])
+        self._loads = self.seen(reduction.loads)
 
     @property
     def made_for(self) -> dict[str, Any] | None:
         """What its basis is made for, arguments of `linear_part_of`; None where it depends on none."""
         if self.projected.shapes is None:
             return None
-        return {"frequency": self.covers, "scale": self.reduction.scale, "observed": list(self.reduction.observed)}
+        made = {"frequency": self.covers, "scale": self.reduction.scale, "observed": list(self.reduction.observed)}
+        return {**made, "held": list(self.held)} if self.held else made
 
     @property
     def error(self) -> float:
@@ -215,7 +227,7 @@ class Condensed:
     def rebuilt(self, values: Mapping[str, float]) -> Condensed:
         """The same part at other parameter values."""
         if self._other is None or self._other.values != values:
-            self._other = Condensed(self.reduction.covering(self.covers, values), values)
+            self._other = Condensed(self.reduction.covering(self.covers, values), values, self.held)
         return self._other
 
     def covering(self, frequency: float) -> Condensed:
@@ -231,7 +243,7 @@ class Condensed:
             wide = self.covers
             while wide < frequency:
                 wide *= _BEYOND
-            self._wider = Condensed(self.reduction.covering(wide, self.values), self.values)
+            self._wider = Condensed(self.reduction.covering(wide, self.values), self.values, self.held)
         return self._wider
 
     # -------------------------------------------------------------------------------------------------- coordinates
@@ -254,27 +266,32 @@ class Condensed:
         squares, turn = eigh((null * values[:, None]).T @ null) if null.shape[1] else (np.zeros(0), np.zeros((0, 0)))
         return Coordinates(static, modes @ (null @ turn), squares, unit, held)
 
-    def _split(self, matrices: Array) -> list[tuple[Array, Array, Array, Array]]:
-        """Matrices (., r, r) in the coordinates (q, z), each as qq, qz, zq, zz."""
+    def _split(self, matrices: Array) -> list[tuple[Array, ...]]:
+        """Matrices (., r, r) in the coordinates (q, z), each as qq, qz, zq, zz, with nothing in the loads' columns."""
         left = np.concatenate((self._coordinates.static, self._coordinates.free), axis=1).T
-        m, parts = self.size, []
+        m, none = self.size, np.zeros((len(left), len(self._loads)))
+        parts: list[tuple[Array, ...]] = []
         for matrix in matrices:
             whole = left @ matrix @ left.T
-            parts.append((whole[:m, :m], whole[:m, m:], whole[m:, :m], whole[m:, m:]))
+            beside = np.concatenate((whole[:, :m], none), axis=1)
+            parts.append((beside[:m], whole[:m, m:], beside[m:], whole[m:, m:]))
         return parts
 
     @lazy
     def _own(self) -> Stack:
         """M, C, K, S in the coordinates (q, z)."""
-        _, _, squares, unit, held = self._coordinates
-        mass, damping, _, structural = self._split(self._matrices)
-        k = self._matrices[2]
-        skew = self._split(0.5 * (k - k.T)[None])[0]
+        static, free, squares, unit, held = self._coordinates
+        m, k = self.size, self._matrices[2]
+        mass, damping, skew, structural = self._split(
+            np.array([*self._matrices[:2], 0.5 * (k - k.T), self._matrices[3]])
+        )
         # K = S - unit M, and S has no coupling
-        whole = (held - unit * mass[0], -unit * mass[1], -unit * mass[2], np.diag(squares))
-        mass = (*mass[:3], np.eye(len(squares)))
-        stiffness = tuple(one + other for one, other in zip(whole, skew, strict=True))
-        return Stack.of([mass, damping, stiffness, structural])
+        qq, qz, zq = (one - unit * other for one, other in zip(skew[:3], mass[:3], strict=True))
+        qq[:, :m] += held
+        # loads act at all frequencies alike
+        qq[:, m:], zq[:, m:] = static.T @ self._loads.T, free.T @ self._loads.T
+        stiffness = qq, qz, zq, np.diag(squares) + skew[3]
+        return Stack.of([(*mass[:3], np.eye(len(squares))), damping, stiffness, structural])
 
     # ------------------------------------------------------------------------------------------------------- blocks
     def _stack(self, names: tuple[str, ...]) -> Stack | None:
@@ -288,18 +305,35 @@ class Condensed:
         """Z at frequencies, `Z_zz^-1 Z_zq`, and the transpose of `Z_qz Z_zz^-1`; what was asked for last is kept."""
         if self._last is None or self._last[0] is not frequency:
             whole = self._own.at(frequency, 0)
-            left = right = whole.solved(whole.zq)
+            right = whole.solved(whole.zq)
+            left = right if right.shape[2] == self.size else np.ascontiguousarray(right[:, :, : self.size])
             if not self._symmetric:
-                turned = whole.transposed()
-                left = np.ascontiguousarray(turned.solved(turned.zq))
-            self._last = frequency, (whole, right, left)
+                turned = whole._replace(zz=whole.zz if whole.zz.ndim == 2 else _transposed(whole.zz))
+                left = np.ascontiguousarray(turned.solved(_transposed(whole.qz)))
+            self._last = frequency, (whole, right, left), {}
         return self._last[1]
 
     def _differentiated(
         self, frequency: NDArray[Any], by: tuple[tuple[tuple[str, ...], int], ...]
     ) -> ComplexArray | None:
-        """A, differentiated by at most two things: each some names, or none and an order in Omega of one."""
+        """A and P of unit loads, (F, m, m + l), differentiated by at most two things: each some names, or none and an
+        order in Omega of one.
+        """
         whole, right, left = self._eliminated(frequency)
+        assert self._last is not None
+        known = self._last[2]
+        if by not in known:
+            known[by] = self._made(frequency, by, whole, right, left)
+        return known[by]
+
+    def _made(
+        self,
+        frequency: NDArray[Any],
+        by: tuple[tuple[tuple[str, ...], int], ...],
+        whole: Blocks,
+        right: ComplexArray,
+        left: ComplexArray,
+    ) -> ComplexArray | None:
         if not by:
             return np.ascontiguousarray(whole.qq - whole.qz @ right)
         total = self._stack(tuple(name for one, _ in by for name in one))
@@ -325,8 +359,7 @@ class Condensed:
         if stack is None:
             return None
         change = stack.at(frequency, order)
-        turned = change.transposed()
-        return turned.zq - turned.inner(left), change.zq - change.inner(right)
+        return change.across(left), change.zq - change.inner(right)
 
     @lazy
     def _symmetric(self) -> bool:
@@ -345,27 +378,47 @@ class Condensed:
     def feeding(self, frequency: Array) -> ComplexArray:
         """See `LinearPart.feeding`."""
         _, right, left = self._eliminated(frequency)
-        return self._feeding.between(frequency, 0, left, right)
+        return self._unknowns_alone(self._feeding.between(frequency, 0, left, right))
 
     @lazy
     def _feeding(self) -> Stack:
         return self._own._replace(entries=feeding_matrices(self._own.entries))
+
+    def _unknowns_alone(self, whole: ComplexArray) -> ComplexArray:
+        """Without the loads' columns."""
+        return whole if whole.shape[2] == self.size else np.ascontiguousarray(whole[:, :, : self.size])
 
     # ----------------------------------------------------------------------------------------------------- contract
     def stiffness(self, frequency: NDArray[Any], order: int = 0) -> ComplexArray:
         """See `LinearPart.stiffness`."""
         result = self._differentiated(frequency, (((), 1),) * order)
         assert result is not None
-        return result
+        return self._unknowns_alone(result)
 
     def stiffness_by(self, frequency: Array, names: tuple[str, ...], order: int = 0) -> ComplexArray | None:
         """See `LinearPart.stiffness_by`."""
-        by = (*(((name,), 0) for name in names), *(((), 1),) * order)
-        return self._differentiated(frequency, by)
+        result = self._differentiated(frequency, (*(((name,), 0) for name in names), *(((), 1),) * order))
+        return None if result is None else self._unknowns_alone(result)
+
+    def loaded(self, frequency: Array, names: tuple[str, ...] = (), order: int = 0) -> ComplexArray | None:
+        """See `LinearPart.loaded`."""
+        result = self._differentiated(frequency, (*(((name,), 0) for name in names), *(((), 1),) * order))
+        return None if result is None else result[:, :, self.size :]
 
     def retain(self, direction: Array) -> Array:
         """See `LinearPart.retain`."""
         return coordinates_among(self.reduction.directions, direction)
+
+    def holds(self, direction: Array) -> bool:
+        """See `LinearPart.holds`."""
+        return _is_among(self.reduction.directions, direction)
+
+    def holding(self, dof: int) -> LinearPart:
+        """The same part with the displacement of a degree of freedom among its unknowns."""
+        if self.holds(np.eye(1, self.system.n, dof)[0]):
+            return self
+        made_for = self.made_for or {}
+        return linear_part_of(self.system, self.values, **{**made_for, "held": [*self.held, dof]})
 
     def equation_of_motion(self) -> tuple[Array, Array, Array]:
         """M, C, K of the structure in its basis, C with what stands for structural damping."""
@@ -396,10 +449,14 @@ class Condensed:
         shapes = self.projected.shapes
         return motion if shapes is None else motion @ shapes.T
 
-    def recovered(self, frequency: Array, amplitudes: ComplexArray) -> ComplexArray:
+    def recovered(self, frequency: Array, amplitudes: ComplexArray, loads: ComplexArray | None = None) -> ComplexArray:
         """See `LinearPart.recovered`."""
         static, free = self._coordinates.static, self._coordinates.free
-        inner = (self._eliminated(frequency)[1] @ amplitudes[:, :, None])[:, :, 0]
+        columns = amplitudes
+        if len(self._loads):
+            none = np.zeros((len(amplitudes), len(self._loads)))
+            columns = np.concatenate((amplitudes, none if loads is None else -loads), axis=1)
+        inner = (self._eliminated(frequency)[1] @ columns[:, :, None])[:, :, 0]
         result: ComplexArray = amplitudes @ static.T - inner @ free.T
         return result
 
@@ -417,20 +474,25 @@ def linear_part_of(
     frequency: float = 1.0,
     scale: float | None = None,
     observed: Sequence[int] = (),
+    held: Sequence[int] = (),
 ) -> LinearPart:
-    """The linear part of a system with the fewest unknowns: condensed where forces leave degrees of freedom alone.
+    """The linear part of a system with the fewest unknowns: condensed where elements leave degrees of freedom alone.
 
     frequency: the highest circular frequency of interest, which decides how a large structure is projected; scale: one
-    within the range of interest; observed: degrees of freedom whose motion it should give as exactly.
+    within the range of interest; observed: degrees of freedom whose motion it should give as exactly; held: those that
+    should be unknowns.
     """
-    at = system.parameters if values is None else values
-    directions = acting(system)
-    if len(directions) in (0, system.n):
+    at, n = system.parameters if values is None else values, system.n
+    directions = unknown_directions(system, held)
+    if len(directions) in (0, n):
         return StructuralMatrices(system, at)
-    units = [np.eye(1, system.n, dof)[0] for dof in observed]
-    served = independent([*directions, *units])
+    components = [c.direction for c in system.load_components()]
+    loads = np.reshape([d for d in components if not _is_among(directions, d)], (-1, n))
+    units = [np.eye(1, n, dof)[0] for dof in observed]
+    served = independent([*directions, *loads, *units])
     unit = frequency / 16.0 if scale is None else scale
-    return Condensed(Reduction.of(system, directions, served, tuple(observed), unit, frequency, at), at)
+    reduction = Reduction.of(system, directions, loads, served, tuple(observed), unit, frequency, at)
+    return Condensed(reduction, at, tuple(held))
 
 
 def condense(
@@ -462,12 +524,21 @@ def condense(
     return linear_part_of(system, None, (check_count("harmonics", harmonics) + 0.5) * highest, None, chosen)
 
 
-def acting(system: System) -> Array:
-    """Independent directions (m, n) that elements read and act along and loads act along, in the order met."""
+def unknown_directions(system: System, held: Sequence[int] = ()) -> Array:
+    """Independent directions (m, n) that displacements are unknown along: those that elements read and act along, and
+    of degrees of freedom `held`, in the order met; without any those that loads act along.
+    """
     n = system.n
     rows = [d for e in system.elements for d in (*e.inputs(n), e.direction(n))]
-    rows += [c.direction for c in system.load_components()]
-    return independent(rows).reshape(-1, n)
+    rows += [np.eye(1, n, dof)[0] for dof in held]
+    return independent(rows or [c.direction for c in system.load_components()]).reshape(-1, n)
+
+
+def acting(system: System) -> Array:
+    """Independent directions (m, n) that elements read and act along and loads act along, in the order met."""
+    return independent([*unknown_directions(system), *(c.direction for c in system.load_components())]).reshape(
+        -1, system.n
+    )
 
 
 def independent(rows: Sequence[Array]) -> Array:
@@ -491,9 +562,19 @@ def independent(rows: Sequence[Array]) -> Array:
 
 def coordinates_among(directions: Array, direction: Array) -> Array:
     """c with `direction = c @ directions`; InputError if it is not among them."""
+    if not _is_among(directions, direction):
+        raise InputError("this direction is not among those that displacements are unknown along")
+    return _nearest(directions, direction)
+
+
+def _nearest(directions: Array, direction: Array) -> Array:
     square, pulled = directions @ directions.T, directions @ direction
     c = np.asarray(np.linalg.solve(square, pulled), dtype=float)
     c[np.abs(c) <= 1e-14 * np.abs(c).max(initial=0.0)] = 0.0
-    if np.linalg.norm(direction - c @ directions) > 10.0 * _DEPENDENT * np.linalg.norm(direction):
-        raise InputError("this direction is not among those that elements and loads act along")
     return c
+
+
+def _is_among(directions: Array, direction: Array) -> bool:
+    """Whether a direction depends on others."""
+    rest = direction - _nearest(directions, direction) @ directions
+    return bool(np.linalg.norm(rest) <= 10.0 * _DEPENDENT * np.linalg.norm(direction))

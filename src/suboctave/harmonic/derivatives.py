@@ -74,8 +74,7 @@ def _unbalanced_second(state: BalanceState, a: Direction, b: Direction) -> Array
     for first, one in a.rates.items():
         for second, two in b.rates.items():
             if one * two != 0.0:
-                values = {**state.values, "omega": state.omega}
-                result -= one * two * state.balance.loads.value(values, state.balance.size, (first, second))
+                result -= one * two * state.load_by(first, second)
     return result
 
 

@@ -31,12 +31,12 @@ _CORRECTIONS, _STILL = 50, 1e-13
 
 
 def at_rest(balance: HarmonicBalance, omega: float, values: Mapping[str, float]) -> BalanceState:
-    """The system at rest under its constant loads, as a motion with one harmonic; ConvergenceError where none is found.
+    """The system at rest under its constant loads, as a motion; ConvergenceError where none is found.
 
     `omega` is the frequency that loads may depend on.
     """
     n = balance.size
-    balance = balance.with_basis(HarmonicBasis(1))
+    balance = balance.with_basis(HarmonicBasis(max(1, balance.highest_load)))
     x = np.zeros((balance.basis.size, n))
     for _ in range(_CORRECTIONS):
         state = balance.at(x, omega, values)
@@ -123,9 +123,8 @@ def action_along(state: BalanceState, motion: Array, omega: float) -> float:
 def mean_energy(state: BalanceState) -> float:
     """The mean of the energy over a period, zero at rest."""
     linear, n = state.linear, state.balance.system.n
-    rest = at_rest(state.balance, state.omega, state.values).x[0]
+    still = at_rest(state.balance, state.omega, state.values).recovered[0].real
     moving = state.recovered
-    still = linear.recovered(np.zeros(1), rest[None].astype(complex)).real[0]
     count = 4 * state.basis.harmonics + 4
     tau = 2.0 * np.pi * np.arange(count) / count
     waves = np.exp(1j * np.multiply.outer(tau, np.arange(len(moving))))
@@ -136,8 +135,12 @@ def mean_energy(state: BalanceState) -> float:
     for member in state.laws.members:
         inputs, out = (linear.seen(d) for d in (member.element.inputs(n), member.element.direction(n)))
         energy += _mean_force(member, inputs @ still, inputs @ way.T) * (way @ out)
-    # the constant part of the loads, on the unknowns
-    return float(energy.mean() - state.load[0] @ (state.x[0] - rest))
+    values = {**state.values, "omega": state.omega}
+    for component in state.balance.system.load_components():
+        if component.harmonic == 0:
+            force = component.amplitude.value(values) * math.cos(component.phase.value(values))
+            energy -= force * (way @ linear.seen(component.direction))
+    return float(energy.mean())
 
 
 def _mean_force(member: Member, rest: Array, way: Array) -> Array:

@@ -21,7 +21,7 @@ from suboctave.harmonic.aft.table import PackedLaws
 from suboctave.harmonic.assembly import Sparse, sparse
 from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
-from suboctave.harmonic.loads import LoadSpectrum
+from suboctave.harmonic.loads import LoadSpectrum, Transfer
 from suboctave.harmonic.quadrature import search_grid
 from suboctave.lazy import lazy
 from suboctave.model.elements.base import BaseElement
@@ -78,9 +78,15 @@ class Equations:
         self.all_groups = (*self.groups, *self.own)
         #: whether any force depends on velocity
         self.any_moving = any(group.moving for group in self.groups)
-        self._load_shapes = [self.linear.retain(c.direction) for c in system.load_components()]
-        self.load_names = {n for c in system.load_components() for n in c.amplitude.names | c.phase.names}
+        components = system.load_components()
+        self._load_shapes = [
+            self.linear.retain(c.direction) if self.linear.holds(c.direction) else None for c in components
+        ]
+        #: what loads depend on, or what they do to the unknowns
+        self.load_names = {n for c in components for n in c.amplitude.names | c.phase.names}
         self._load_order = sorted(self.load_names)
+        if any(shape is None for shape in self._load_shapes):
+            self.load_names |= {"omega", *self.matrix_names}
         #: names that every element's coefficients depend on
         self._names = [tuple(sorted({n for c in e.coefficients for n in c.names})) for e in system.elements]
         self._all_names = sorted({name for names in self._names for name in names})
@@ -141,8 +147,8 @@ class Equations:
 
     @property
     def steady(self) -> bool:
-        """Whether the unbalanced force depends on omega through the motion's frequency alone, and not at fixed X."""
-        return not (self.any_moving or self.own or "omega" in self.load_names)
+        """Whether the forces of the elements do not depend on omega at fixed X."""
+        return not (self.any_moving or self.own)
 
     def with_samples(self: _Same, samples: tuple[int | None, ...]) -> _Same:
         """The same equations with other frozen sample counts."""
@@ -205,8 +211,10 @@ class Equations:
         times = [e.time_harmonic for e in self.system.elements if isinstance(e, CoupledElement)]
         return max([c.harmonic for c in self.system.load_components()] + times, default=0)
 
-    def load(self, values: Mapping[str, float], omega: float) -> Array:
-        """Load coefficients P, shape (2 H + 1, size)."""
+    def load(self, values: Mapping[str, float], omega: float, transfer: Transfer) -> Array:
+        """Load coefficients P, shape (2 H + 1, size); transfer: see `loads.Transfer`."""
+        if self.loads.elsewhere:
+            return self.loads.value({**values, "omega": omega}, self.size, (), transfer)
         if values is self.values and "omega" not in self.load_names:
             return self._own_load
         key = tuple([omega if n == "omega" else values[n] for n in self._load_order])

@@ -137,7 +137,12 @@ class BalanceState:
     @lazy
     def recovered(self) -> ComplexArray:
         """Complex amplitudes in the linear part's equation of motion, (H + 1, N)."""
-        return self.linear.recovered(self.frequencies, to_complex(self.x))
+        return self.linear.recovered(self.frequencies, to_complex(self.x), self.loads_elsewhere)
+
+    @property
+    def loads_elsewhere(self) -> ComplexArray | None:
+        """See `LoadSpectrum.waves`."""
+        return self.balance.loads.waves({**self.values, "omega": self.omega})
 
     @property
     def packed(self) -> PackedLaws:
@@ -252,8 +257,8 @@ class BalanceState:
         """What balances: see `Balanced`."""
         balance = self.balance
         parts, sizes = np.empty((3, *self.x.shape)), np.empty(4)
-        load, weight = balance.load(self.values, self.omega), balance.scales()[1]
-        balance_residual(self.x, self.blocks, self._spectra[0], load, balance.directions, weight, parts, sizes)
+        weight = balance.scales()[1]
+        balance_residual(self.x, self.blocks, self._spectra[0], self.load, balance.directions, weight, parts, sizes)
         size, *forces = sizes.tolist()
         return Balanced(parts[1], parts[2], size, sum(forces))
 
@@ -344,14 +349,24 @@ class BalanceState:
             return self.slope
         return self.linear.stiffness_by(self.frequencies, (name,)) if name in self.balance.matrix_names else None
 
-    @property
+    @lazy
     def load(self) -> Array:
         """Coefficients of the loads, shape (2 H + 1, size)."""
-        return self.balance.load(self.values, self.omega)
+        return self.balance.load(self.values, self.omega, self._loaded)
 
-    def load_by(self, name: str) -> Array:
-        """The same differentiated by "omega" or a parameter."""
-        return self.balance.loads.value({**self.values, "omega": self.omega}, self.balance.size, (name,))
+    def load_by(self, *names: str) -> Array:
+        """The same differentiated by "omega" or parameters, two at most."""
+        values = {**self.values, "omega": self.omega}
+        return self.balance.loads.value(values, self.balance.size, names, self._loaded)
+
+    def _loaded(self, names: tuple[str, ...]) -> ComplexArray | None:
+        """See `loads.Transfer`."""
+        inside = tuple(name for name in names if name != "omega")
+        order = len(names) - len(inside)
+        if not self.balance.matrix_names.issuperset(inside):
+            return None
+        made = self.linear.loaded(self.frequencies, inside, order)
+        return made if made is None or not order else self.basis.multiples[:, None, None] ** order * made
 
     def unbalanced_by(self, name: str) -> Array | None:
         """S differentiated by "omega" or a parameter at fixed X, shape (2 H + 1, size); None if zero."""

@@ -1,12 +1,12 @@
 """The linear part of a structure, behind one small contract.
 
 Harmonic balance at a frequency Omega couples the unknown displacement amplitudes `x` (complex, `x exp(i Omega t)`)
-with the amplitudes `s` of element forces minus loads by
+with the amplitudes `s` of element forces and P of loads by
 
-    A(Omega) x + s = 0.
+    A(Omega) x + s = P.
 
 With all degrees of freedom unknown `A = K - Omega^2 M + i Omega C + i sgn(Omega) S`, S the structural damping;
-`condensed` eliminates those that no force acts on.
+`condensed` eliminates those that no element acts on.
 Whatever is above asks for A and its derivatives with respect to Omega and the parameters, and for the matrices of an
 equation of motion with the same response (for monodromy and scaling); it never sees which form it is given. The
 structure has n DOFs, its equation of motion N, and `size` of them, or directions through them, are unknown.
@@ -57,6 +57,17 @@ class LinearPart(Protocol):
         Raises InputError for a direction that the unknown DOFs do not hold.
         """
 
+    def holds(self, direction: Array) -> bool:
+        """Whether the unknown DOFs hold a direction."""
+
+    def holding(self, dof: int) -> LinearPart:
+        """The same part with the displacement of a DOF among its unknowns."""
+
+    def loaded(self, frequency: Array, names: tuple[str, ...] = (), order: int = 0) -> ComplexArray | None:
+        """P of a unit of each of the loads whose directions the unknowns do not hold, (F, size, loads), or `d^order / d
+        Omega^order` of it, differentiated by parameters, by two things at most; None if zero.
+        """
+
     def equation_of_motion(self) -> tuple[Array, Array, Array]:
         """Mass, damping, stiffness (N, N) of an equation of motion with this response, N >= size.
 
@@ -72,9 +83,9 @@ class LinearPart(Protocol):
     def seen(self, direction: Array) -> Array:
         """A direction in the structure's DOFs (..., n) as one in those of the equation of motion (..., N)."""
 
-    def recovered(self, frequency: Array, amplitudes: ComplexArray) -> ComplexArray:
-        """Complex amplitudes (F, size) of the unknowns at frequencies (F,) as those of the equation of motion, (F,
-        N).
+    def recovered(self, frequency: Array, amplitudes: ComplexArray, loads: ComplexArray | None = None) -> ComplexArray:
+        """Complex amplitudes (F, size) of the unknowns at frequencies (F,) as those of the equation of motion, (F, N);
+        loads: those of the loads that `loaded` is about, (F, loads), None where there are none.
         """
 
     def shaped(self, motion: NDArray[Any]) -> NDArray[Any]:
@@ -128,6 +139,18 @@ class StructuralMatrices:
         """All DOFs are unknowns."""
         return direction
 
+    def holds(self, direction: Array) -> bool:
+        """All DOFs are unknowns."""
+        return True
+
+    def holding(self, dof: int) -> StructuralMatrices:
+        """All DOFs are unknowns."""
+        return self
+
+    def loaded(self, frequency: Array, names: tuple[str, ...] = (), order: int = 0) -> ComplexArray | None:
+        """The unknowns hold all loads."""
+        return None
+
     def equation_of_motion(self) -> tuple[Array, Array, Array]:
         """M, C, K of the system, C with what stands for structural damping."""
         return self._equation
@@ -149,7 +172,7 @@ class StructuralMatrices:
         """The equation of motion is the structure's."""
         return direction
 
-    def recovered(self, frequency: Array, amplitudes: ComplexArray) -> ComplexArray:
+    def recovered(self, frequency: Array, amplitudes: ComplexArray, loads: ComplexArray | None = None) -> ComplexArray:
         """The unknowns are the DOFs of the equation of motion."""
         return amplitudes
 
@@ -214,7 +237,7 @@ def in_words(linear: LinearPart, dofs: int, how: str, declared: UnitSystem | Non
     units = ((circular, 1.0), (cycles, 2.0 * np.pi))
     shown = [f"{', '.join(f'{w / unit:.6g}' for w in lowest)} {name}" for name, unit in units]
     return (
-        f"Linear part: {dofs} degrees of freedom, {how}; {linear.size} unknown displacements\n"
+        f"Linear part: {dofs} degrees of freedom, {how}; {linear.size} unknown displacement{'s' if linear.size > 1 else ''}\n"
         f"  natural frequencies {shown[0]}\n                      {shown[1]}"
     )
 

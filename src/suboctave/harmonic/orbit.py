@@ -34,7 +34,7 @@ class PeriodicOrbit:
         The equations it solves (system, basis, frozen samples).
     x
         The unknowns of these equations, shape (2 H + 1, balance.size): coefficients of all degrees of freedom, or of
-        displacements along the directions that forces act on; `coefficients` has them all.
+        displacements along the directions of its elements; `coefficients` has them all.
     omega
         Circular frequency of the load, rad per unit time.
     values
@@ -47,7 +47,7 @@ class PeriodicOrbit:
         The rule its harmonics were chosen by, None if their number was given; curves continued from it inherit it.
     zeta
         Of a nonlinear mode the damping ratio that keeps it going: a damping of `-2 zeta omega` per unit of mass, which
-        has its share in what moves where no force acts. The equations are those without it.
+        has its share in what moves where no element acts. The equations are those without it.
     """
 
     balance: HarmonicBalance
@@ -96,7 +96,8 @@ class PeriodicOrbit:
     @cached_property
     def _moving(self) -> ComplexArray:
         """Complex amplitudes of the linear part's equation of motion, (H + 1, N)."""
-        return self._linear.recovered(self.basis.multiples * self.omega, to_complex(self.x))
+        waves = self.balance.loads.waves({**self.values, "omega": self.omega})
+        return self._linear.recovered(self.basis.multiples * self.omega, to_complex(self.x), waves)
 
     @property
     def amplitudes(self) -> ComplexArray:

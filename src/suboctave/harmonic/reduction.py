@@ -73,7 +73,8 @@ class Projected(NamedTuple):
 
 
 class Reduction:
-    """A structure in a basis that is grown for the directions (m, n) that forces act along; larger ones grow from it.
+    """A structure in a basis that is grown for the directions (m, n) that its unknowns are displacements along, and
+    those of other loads, (l, n); larger ones grow from it.
 
     served: these and others that the motion is read along, (k, n), such as those of the degrees of freedom `observed`;
     scale: a frequency within the range of interest; projected: the structure in the basis. Made by `of` and `covering`:
@@ -84,10 +85,11 @@ class Reduction:
     _values: Mapping[str, float]
 
     def __init__(
-        self, system: System, directions: Array, served: Array, observed: tuple[int, ...], scale: float
+        self, system: System, directions: Array, loads: Array, served: Array, observed: tuple[int, ...], scale: float
     ) -> None:
         self.system = system
         self.directions = directions
+        self.loads = loads
         self.served = served
         self.observed = observed
         self.scale = scale
@@ -105,6 +107,7 @@ class Reduction:
         cls,
         system: System,
         directions: Array,
+        loads: Array,
         served: Array,
         observed: tuple[int, ...],
         scale: float,
@@ -112,11 +115,12 @@ class Reduction:
         values: Mapping[str, float],
     ) -> Reduction:
         """The smallest basis that serves up to a frequency at these values of the parameters."""
-        made = cls(system, directions, served, observed, scale)
+        made = cls(system, directions, loads, served, observed, scale)
         if system.n <= COMPLETE:
             return made
         at = made._expressions(values)
-        key = (*map(id, made._matrices), *(a.tobytes() for a in (directions, served, at)), observed, scale, frequency)
+        read = (a.tobytes() for a in (directions, loads, served, at))
+        key = (*map(id, made._matrices), *read, observed, scale, frequency)
         return _kept(_IN_USE, key, lambda: made._grown_to(frequency, values, at))
 
     def _expressions(self, values: Mapping[str, float]) -> Array:
@@ -174,11 +178,13 @@ class Reduction:
         """Of the flexibility at the highest frequency, relative, against a direct solution of the whole structure; 0
         for the structure itself. Known when it is asked for: the solution takes longer than most of the rest.
         """
-        if self.projected.shapes is None:
+        shapes, top = self.projected.shapes, self.projected.covers
+        if shapes is None:
             return 0.0
-        seen, top = self.projected.seen, self.projected.covers
+        along = np.concatenate((self.directions, self.loads))
+        seen = along @ shapes
         m, c, k, s = (matrix.value(self._values) for matrix in self.projected.matrices)
-        exact = exact_flexibility(self.system, self.directions, top, self._values)
+        exact = exact_flexibility(self.system, along, top, self._values)
         off = np.abs(seen @ np.linalg.solve(k - top**2 * m + 1j * (top * c + s), seen.T) - exact)
         size = np.sqrt(np.abs(exact.diagonal()))
         return float((off / np.multiply.outer(size, size)).max())

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from suboctave.curves.trace import BranchPoint
 from suboctave.errors import InputError, shortened
-from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis, to_complex, to_real
+from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis, to_real
 from suboctave.harmonic.condensed import linear_part_of
 from suboctave.harmonic.energy import action, fed, mean_energy, modal_amplitude, twice_kinetic
 from suboctave.harmonic.evaluation import BalanceState, HarmonicBalance
@@ -173,8 +173,7 @@ def _direction(curve: ModeCurve, at: int | str | ArrayLike | None) -> Array:
 
 def _amplitudes(state: BalanceState) -> ComplexArray:
     """Complex amplitudes of all degrees of freedom, (H + 1, n)."""
-    linear = state.linear
-    return np.asarray(linear.shaped(linear.recovered(state.frequencies, to_complex(state.x))))
+    return np.asarray(state.linear.shaped(state.recovered))
 
 
 def _powers(system: System, states: list[BalanceState], observe: int) -> Iterator[float]:

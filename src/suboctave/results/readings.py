@@ -393,13 +393,16 @@ def ground_and_load(orbit: PeriodicOrbit, r: Array) -> tuple[ComplexArray, Compl
     """Complex amplitudes (H + 1,) of the force on the ground and of the force applied, along r."""
     state, balance = orbit.state(), orbit.balance
     frequencies, linear = orbit.basis.multiples * orbit.omega, state.linear
-    motion = linear.recovered(frequencies, to_complex(orbit.x))
+    motion = state.recovered
     damping, stiffness, structural = (
         motion @ linear.seen(r @ part.compact(orbit.values)) for part in balance.system.linear_parts[1:]
     )
     held = stiffness + 1j * (frequencies * damping + np.sign(frequencies) * structural)
-    along = linear.read(r)
-    return held + to_complex(state.force) @ along, to_complex(balance.load(orbit.values, orbit.omega)) @ along
+    loads, values = balance.loads, {**orbit.values, "omega": orbit.omega}
+    applied = np.zeros(len(frequencies), dtype=complex)
+    for harmonic in {c.harmonic for c in balance.system.load_components()}:
+        applied[harmonic * orbit.basis.nu] = loads.force(harmonic, values, r)
+    return held + to_complex(state.force) @ linear.read(r), applied
 
 
 def of_harmonic(amplitudes: ComplexArray, k: float, nu: int) -> float:

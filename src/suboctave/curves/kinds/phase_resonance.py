@@ -23,22 +23,23 @@ from suboctave.harmonic.evaluation import BalanceState
 
 @dataclass(frozen=True)
 class PhaseResonance(Augmentation):
-    """`order` k/q; `dof` of the displacement; `driven`, the unknown whose load counts; `unit` of the equation."""
+    """`order` k/q; `dof` of the displacement; `driven`, that whose load counts; `unit` of the equation."""
 
     order: Fraction
     dof: int
     driven: int
     unit: float = 1.0
     name = "phase_resonance"
+    reads_observed = True
 
     @classmethod
     def through(cls, item: Bifurcation, state: BalanceState, names: tuple[str, ...]) -> tuple[PhaseResonance, Array]:
         """See `Augmentation.through`; the number `harmonic` is a multiple of omega."""
         nu, extra = state.basis.nu, np.zeros(0)
-        load = state.load[2 * nu - 1 : 2 * nu + 1]
-        if not load.any():
+        driven = state.balance.loads.strongest(1, {**state.values, "omega": state.omega})
+        if driven < 0:
             raise InputError("there is no load at omega that a phase could be measured against")
-        order, driven = harmonic_index(item.context["onto"]["harmonic"], nu), int(np.argmax((load**2).sum(axis=0)))
+        order = harmonic_index(item.context["onto"]["harmonic"], nu)
         return cls(Fraction(order, nu), item.context["observe"], driven).at(state, extra, names).renewed(), extra
 
     def at(self, state: BalanceState, extra: Array, names: tuple[str, ...]) -> PhaseEquations:
@@ -55,11 +56,13 @@ class PhaseEquations(Equations):
             raise ConvergenceError(f"the harmonic at {of.order} omega is not kept")
         self.reads = state.balance.along(of.dof)
         z = complex(*(state.x[self.at : self.at + 2] @ self.reads)).conjugate()
-        f, (k, q) = self._conjugate(state.load), of.order.as_integer_ratio()
+        f, (k, q) = self._conjugate_force(), of.order.as_integer_ratio()
         self.product, self.by_z, self.by_f = z**q * f**k, q * z ** (q - 1) * f**k, k * z**q * f ** (k - 1)
 
-    def _conjugate(self, load: Array) -> complex:
-        return complex(*load[2 * self.state.basis.nu - 1 :, self.of.driven][:2])
+    def _conjugate_force(self, *names: str) -> complex:
+        """The conjugate amplitude of the load, differentiated by names."""
+        values = {**self.state.values, "omega": self.state.omega}
+        return self.state.balance.loads.force(1, values, self.of.driven, names).conjugate()
 
     @property
     def values(self) -> Array:
@@ -69,7 +72,7 @@ class PhaseEquations(Equations):
     def rows(self) -> Array:
         by_x = np.zeros_like(self.state.x)
         by_x[self.at : self.at + 2] = np.outer((self.by_z.real, self.by_z.imag), self.reads)
-        along = [(self.by_f * self._conjugate(self.state.load_by(name))).real for name in self.names]
+        along = [(self.by_f * self._conjugate_force(name)).real for name in self.names]
         return np.append(by_x.ravel(), along)[None] / self.of.unit
 
     def renewed(self) -> PhaseResonance:

@@ -42,6 +42,7 @@ class Ridge(Augmentation):
     multiple: float | None
     border: Array
     along: float
+    reads_observed = True
 
     @property
     def name(self) -> str:

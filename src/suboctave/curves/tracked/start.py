@@ -78,12 +78,16 @@ def curve_through(
     widths = {**(item.context or {}).get("bounds", {})} if is_extremum(item) else {}
     widths |= ranges or {}
     spans = [abs(float(widths[n][1]) - float(widths[n][0])) if n in widths else abs(item.parameter(n)) for n in names]
-    x = orbit.basis.resized(orbit.x, basis)
-    balance = HarmonicBalance(orbit.system, basis, linear=own_linear_part(orbit)).settle(x, orbit.omega)
-    state = balance.at(x, orbit.omega)
     equations: type[Augmentation] = CycleWith if on_free_phase(item) else formulation.equations(kind_of(item))
     if on_mode(item) and len(names) == 2:
         equations = MODE_EVENTS[item.kind]
+    linear, x = own_linear_part(orbit), orbit.x
+    if linear is not None and equations.reads_observed:
+        linear = linear.holding(item.context["observe"])
+        x = linear.read(orbit.coefficients)
+    x = orbit.basis.resized(x, basis)
+    balance = HarmonicBalance(orbit.system, basis, linear=linear).settle(x, orbit.omega)
+    state = balance.at(x, orbit.omega)
     augmentation, extra = equations.through(item, state, names)
     force = state.balanced.scale
     curve = MotionProblem(

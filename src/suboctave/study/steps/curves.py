@@ -19,7 +19,7 @@ from suboctave.analysis.track import motion_kind, track
 from suboctave.bifurcation.bifurcation import CURVES_THROUGH
 from suboctave.continuation import Event
 from suboctave.errors import InputError, suggest
-from suboctave.harmonic.condensed import acting
+from suboctave.harmonic.condensed import unknown_directions
 from suboctave.kinds import KINDS, TRACKED_KINDS
 from suboctave.model.description import from_plain
 from suboctave.model.inputs import check_bounds, check_range, check_system
@@ -91,8 +91,8 @@ class FollowingStep(Step):
         for key in ("max_step", "observe", "newton", "stepping", "stability", "events", "formulation"):
             beside = {"stepping": given.get("stepping")} if key == "max_step" else {}
             yield from tried(key, partial(settings_of, around.system, {key: given.get(key), **beside}))
-        # displacements along which nothing acts are no unknowns
-        size = len(acting(around.system)) or around.system.n
+        # displacements along which no element acts are no unknowns
+        size = len(unknown_directions(around.system)) or around.system.n
         if isinstance(self.harmonics, int) and (2 * self.harmonics + 1) * size > _MOST:
             yield ("harmonics",), f"with forces along {size} DOFs that is too many unknowns: keep fewer harmonics"
 
