@@ -98,7 +98,14 @@ MAKERS = {
 }  # fmt: skip
 
 
-@pytest.fixture(scope="module", params=list(MAKERS))
+#: systems of two degrees of freedom are in sections, too
+LATER = ("trajectory, two",)
+
+
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(name, marks=pytest.mark.slow if name in LATER else ()) for name in MAKERS],
+)
 def result(request):
     return MAKERS[request.param]()
 
