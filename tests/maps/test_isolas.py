@@ -77,7 +77,7 @@ def test_stable_parts_by_shooting(isolas):
     assert len(parts) == 2
     first, second = (b.omega for b in branch.bifurcations["PD"])
     assert (parts[0][1], parts[1][0]) == pytest.approx(sorted((first, second)))
-    for index in range(3, len(branch), 51):
+    for index in range(3, len(branch), 101):
         assert so.verify(branch.orbits[index]).agrees
 
 
