@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from slow import slow
 
 import suboctave as so
 from suboctave.curves.trace import Unsettled, joined
@@ -44,7 +45,11 @@ def judged(systems: ModuleType, seed: int, nu: int = 1) -> dict[str, Any]:
     ("seed", "reason"),
     [
         (4, "two real multipliers outside the circle meet, and cross it as a pair right behind a grazing"),
-        (33, "with more harmonics, Newton's method runs from a limit point behind a grazing to the one before it"),
+        pytest.param(
+            33,
+            "with more harmonics, Newton's method runs from a limit point behind a grazing to the one before it",
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_no_event_is_missed_and_none_added(systems: ModuleType, seed: int, reason: str) -> None:
@@ -56,6 +61,7 @@ def test_no_event_is_missed_and_none_added(systems: ModuleType, seed: int, reaso
     assert row.worst < 2e-6
 
 
+@pytest.mark.slow
 def test_a_pair_beside_a_limit_point_whose_multipliers_err(systems: ModuleType) -> None:
     # right before the limit point the multipliers put one beyond +1 that det J_0 has inside: with the count by
     # multipliers alone, the pair that leaves the circle there was lost without a word
@@ -101,7 +107,8 @@ def test_a_border_with_three_corners_closes(systems: ModuleType) -> None:
     assert [value for _, value in met] == pytest.approx([value for _, value in known], abs=1e-5)
 
 
-def test_a_step_whose_interior_has_no_solution_is_halved(systems: ModuleType) -> None:
+@pytest.mark.parametrize("high", [1.3, *slow(1.01)])
+def test_a_step_whose_interior_has_no_solution_is_halved(systems: ModuleType, high: float) -> None:
     """It leads over two corners with a loop between them; a turn that is not located in a corner is known as well as
     the step is long.
     """
@@ -115,10 +122,9 @@ def test_a_step_whose_interior_has_no_solution_is_halved(systems: ModuleType) ->
         ("extremum", "omega", 1.7007747), ("extremum", "omega", 1.7302932), ("extremum", "omega", 1.7303259),
         ("extremum", "omega", 1.7323076), ("extremum", "omega", 1.7323122),
     ]  # fmt: skip
-    for high in (1.01, 1.3):
-        border = so.track(response.bifurcations["PD"][0], "F", (0.4 * load, high * load))
-        met = sorted((event.kind, event.parameter_name, event.parameter("F")) for event in border.bifurcations)
-        met = [event for event in met if event[2] < load]
-        assert [event[:2] for event in met] == [event[:2] for event in known]
-        assert [event[2] for event in met] == pytest.approx([event[2] for event in known], abs=1e-6)
-        assert max(event.uncertainty for event in border.bifurcations) < 1e-6
+    border = so.track(response.bifurcations["PD"][0], "F", (0.4 * load, high * load))
+    met = sorted((event.kind, event.parameter_name, event.parameter("F")) for event in border.bifurcations)
+    met = [event for event in met if event[2] < load]
+    assert [event[:2] for event in met] == [event[:2] for event in known]
+    assert [event[2] for event in met] == pytest.approx([event[2] for event in known], abs=1e-6)
+    assert max(event.uncertainty for event in border.bifurcations) < 1e-6

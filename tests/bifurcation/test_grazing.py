@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.optimize import brentq, minimize_scalar
+from slow import slow
 
 import suboctave as so
 from suboctave.bifurcation.gaps import levels
@@ -244,7 +245,7 @@ def test_every_change_in_the_number_of_impacts_is_explained(low_frequencies):
         assert places.any()
 
 
-@pytest.mark.parametrize("max_step", [0.01, 0.3])
+@pytest.mark.parametrize("max_step", [0.3, *slow(0.01)])
 def test_the_same_grazings_at_any_step(low_frequencies, max_step):
     curve = so.frequency_response(low_frequencies.system, (1.0, 0.37), max_step=max_step)
     assert described(curve.grazings) == described(low_frequencies.grazings)

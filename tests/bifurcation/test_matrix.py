@@ -13,8 +13,8 @@ import suboctave as so
 
 #: two events are the same within this in omega: what the tolerance of located events leaves
 SAME = 3e-6
-COARSE = (None, 0.1, 0.3)
-FINE = (0.01, 0.03)
+COARSE = (None, 0.3)
+FINE = (0.01, 0.03, 0.1)
 
 
 def curves():

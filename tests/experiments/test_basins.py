@@ -108,7 +108,10 @@ def test_chaos_and_escape_are_told():
     assert told.labels[0, 0] == -2
 
 
-@pytest.mark.parametrize(("system", "omega"), [(DUFFING, 1.5), (so.library.reference_oscillator(p=0.55, j=0.5), 2.25)])
+@pytest.mark.parametrize(
+    ("system", "omega"),
+    [(DUFFING, 1.5), pytest.param(so.library.reference_oscillator(p=0.55, j=0.5), 2.25, marks=pytest.mark.slow)],
+)
 def test_what_is_inside_a_neighbourhood_ends_on_its_motion(system, omega):
     """Other states than those that were looked at when it was made, half of them on its boundary, to the end."""
     found = so.basins(system, omega=omega, box=BOX, grid=(16, 16))

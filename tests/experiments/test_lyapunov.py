@@ -9,7 +9,7 @@ import suboctave as so
 from suboctave.errors import InputError
 from suboctave.experiments.common import check_continuous
 from suboctave.experiments.lyapunov import averaged
-from suboctave.timedomain import shoot
+from suboctave.timedomain import integrate, shoot
 
 CHAOTIC = so.library.reference_oscillator(p=1.6, Kc=4.2, j=0.0)
 
@@ -33,8 +33,10 @@ def test_sum_is_the_mean_rate_of_volume_of_nonlinear_dampers():
         loads=[so.HarmonicLoad(0, amplitude=1.0)],
     )  # fmt: skip
     found = so.lyapunov_exponents(system, omega=0.9, periods=60, trajectories=2)
-    motion = so.integrate(system, found.end, omega=0.9, periods=1, steps_per_period=4000)
-    expected = -np.mean(0.05 + 2.0 * 0.4 * np.abs(motion.velocity[:-1, 0])) / 2.0
+    period = 2.0 * np.pi / 0.9
+    motion = integrate(system, found.end, (0.0, period), 0.9)
+    _, velocity = motion.at(period * np.arange(4000) / 4000)
+    expected = -np.mean(0.05 + 2.0 * 0.4 * np.abs(velocity)) / 2.0
     assert found.divergence == pytest.approx(expected, abs=1e-7)
     assert found.defect < 1e-9
 

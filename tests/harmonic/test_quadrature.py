@@ -39,7 +39,7 @@ def gaps(c):
 
 
 @pytest.mark.filterwarnings("ignore::scipy.integrate.IntegrationWarning")
-@pytest.mark.parametrize("sharpness", [30.0, 3e5, *slow(3e3)])
+@pytest.mark.parametrize("sharpness", [3e5, *slow(30.0, 3e3)])
 @pytest.mark.parametrize("where", ["passed", "grazed", "missed"])
 @pytest.mark.parametrize("motion", MOTIONS)
 def test_sharp_stop_against_adaptive_quadrature(motion, where, sharpness):

@@ -114,7 +114,7 @@ def test_a_part_that_is_missing(found, tmp_path):
 
 
 def test_none_found_is_a_result_too(tmp_path):
-    isolas = so.find_isolas(duffing(), (0.5, 2.0), "F", (0.01, 0.02), 1, values=2, depth=0, search=())
+    isolas = so.find_isolas(duffing(), (1.5, 2.0), "F", (0.01, 0.02), 1, values=2, depth=0, search=())
     assert not isolas
     again = so.load(isolas.save(tmp_path / "none.nc"))
     assert repr(again) == repr(isolas)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from functools import cache
 
 import numpy as np
 import pytest
@@ -48,7 +49,7 @@ def the_same(a, b, path="result"):
 
 
 def _branch():
-    return so.frequency_response(SYSTEM, (2.2, 2.6), max_step=0.2)
+    return so.frequency_response(SYSTEM, (2.2, 2.6), max_step=0.2, harmonics=9)
 
 
 def _wide():
@@ -57,6 +58,11 @@ def _wide():
         np.eye(2), 0.05 * np.eye(2), np.array([[2.0, -1.0], [-1.0, 2.0]]), so.ElasticStop((0, 1), 3.0, 0.2),
         so.HarmonicLoad(0, "F"), {"F": 0.3}, dof_names=("left", "right"),
     )  # fmt: skip
+
+
+@cache
+def _basins():
+    return so.basins(SYSTEM, omega=2.25, box=((-1.0, 1.0), (-1.0, 1.0)), grid=(9, 8), periods=200)
 
 
 MAKERS = {
@@ -87,12 +93,19 @@ MAKERS = {
         SYSTEM, (2.2, 2.4), parameter="p", values=(0.5, 0.6), counts=(3, 2), transient=10, periods=40,
         parameters={"j": 0.4},
     ),
-    "basins": lambda: so.basins(SYSTEM, omega=2.25, box=((-1.0, 1.0), (-1.0, 1.0)), grid=(9, 8), periods=200),
-    "verification": lambda: so.verify(_branch(), points=4),
+    "basins": lambda: _basins(),
+    "verification": lambda: so.verify(_branch(), points=2),
 }  # fmt: skip
 
 
-@pytest.fixture(scope="module", params=list(MAKERS))
+#: systems of two degrees of freedom are in sections, too
+LATER = ("trajectory, two",)
+
+
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(name, marks=pytest.mark.slow if name in LATER else ()) for name in MAKERS],
+)
 def result(request):
     return MAKERS[request.param]()
 
@@ -140,7 +153,7 @@ def test_a_journal_gives_it_back(result):
 
 
 def test_what_is_loaded_goes_on(tmp_path):
-    found = so.basins(SYSTEM, omega=2.25, box=((-1.0, 1.0), (-1.0, 1.0)), grid=(9, 8), periods=200)
+    found = _basins()
     again = so.load(found.save(tmp_path / "basins.nc"))
     assert again.attractor_at(0.0, 0.0).name == found.attractor_at(0.0, 0.0).name
     ends = so.integrate(again.system, again.attractors[0].state, omega=again.omega, periods=again.attractors[0].period)

@@ -28,6 +28,7 @@ type = "bifurcation_diagram"
 omega = [4.5, 2.2]
 max_step = 0.3
 """
+SMALL = DIAGRAM.replace("[4.5, 2.2]", "[4.5, 3.9]") + "depth = 1\n"
 LATER = """
 [[analyses]]
 name = "other end"
@@ -219,7 +220,7 @@ def test_what_is_printed(ran, suboctave, tmp_path):
 
 
 def test_a_choice_that_is_not_there_is_told_in_words(study_file, suboctave):
-    small = SYSTEM + DIAGRAM.replace("[4.5, 2.2]", "[4.5, 3.9]") + "depth = 1\n"
+    small = SYSTEM + SMALL
     later = '[[analyses]]\nname = "on"\ntype = "continue_branch"\nparameter = "p"\nbounds = [1.0, 2.0]\n'
     for choice, words in (
         ("branch = 7", "has 2 branches"),
@@ -279,8 +280,8 @@ def test_ctrl_c_keeps_the_branches_that_are_there_and_resume_repeats_none(
     assert not journal.exists()
 
 
-def test_a_finished_diagram_is_taken_from_the_journal(study_file, by_script):
-    path = study_file(SYSTEM + DIAGRAM + LATER)
+def test_a_finished_diagram_is_taken_from_the_journal(study_file):
+    path = study_file(SYSTEM + SMALL + LATER.replace("index = 1", "index = 0"))
 
     @contextmanager
     def impatient(step):
@@ -293,5 +294,7 @@ def test_a_finished_diagram_is_taken_from_the_journal(study_file, by_script):
     assert run_study(read_study(path), watch=impatient).interrupted
     again = run_study(read_study(path), resume=True)
     assert [item.reused for item in again.finished][:2] == [True, False]
-    same(again.finished[0].result, by_script[0])
-    same(again.finished[1].result, by_script[1])
+    system = so.library.reference_oscillator(p=1.7, regularization=3000.0)
+    diagram = so.bifurcation_diagram(system, (4.5, 3.9), max_step=0.3, depth=1)
+    same(again.finished[0].result, diagram)
+    same(again.finished[1].result, so.switch_branch(diagram[0].branch.bifurcations["PD"][0], max_step=0.3))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from slow import slow
 
 import suboctave as so
 from suboctave.errors import ConvergenceError, InputError
@@ -81,7 +82,7 @@ SYSTEMS = {
 TIMED = 1.7
 #: the others take seconds each to compile when nothing is in the cache
 QUICK = ("stops", "mixture")
-EACH = [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in SYSTEMS]
+EACH = [*QUICK, *slow(*(name for name in SYSTEMS if name not in QUICK))]
 
 
 def states_for(system, count=3):
@@ -101,7 +102,7 @@ def test_the_accurate_flow_is_that_of_scipy(name):
         np.testing.assert_allclose(motions.end[i], reference(system, x[i], 2), rtol=0, atol=2e-8)
 
 
-@pytest.mark.parametrize("name", EACH)
+@pytest.mark.parametrize("name", ["stops", *slow(*(name for name in SYSTEMS if name != "stops"))])
 def test_newmark_tends_to_it_with_the_square_of_the_step(name):
     system = SYSTEMS[name]
     x = states_for(system)[0]

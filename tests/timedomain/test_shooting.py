@@ -130,7 +130,7 @@ def test_reference_bifurcations(s, p, j, periods, kind, start, state, omega, amp
 def test_neimark_sacker_of_the_nltva(start, omega, from_omega):
     """Detroux et al.'s absorber at F = 0.11; positions from harmonic balance, which agrees for H = 5, 7, 9."""
     system = so.library.nltva(F=0.11)
-    state = follow(system, np.zeros(4), np.linspace(from_omega, start, 16))
+    state = follow(system, np.zeros(4), np.linspace(from_omega, start, 8))
     found = locate_by_shooting(system, "NS", state, start)
     assert found.omega == pytest.approx(omega, abs=5e-5)
     pair = found.multipliers[np.abs(found.multipliers.imag) > 0.1][0]
@@ -151,14 +151,14 @@ def test_symmetry_breaking_of_a_duffing_oscillator(start, omega):
 def test_a_limit_point_is_no_branch_point():
     system = so.library.reference_oscillator(p=0.55, j=0.0)
     with pytest.raises(ConvergenceError):
-        locate_by_shooting(system, "BP", [-0.353, 8.63], 2.547, max_iterations=12)
+        locate_by_shooting(system, "BP", [-0.353, 8.63], 2.547, max_iterations=6)
 
 
 def test_limit_points_of_a_softening_duffing_oscillator():
     """m = 1, c = 0.12, k = 1, cubic -0.1, F = 0.2; positions from harmonic balance. The response bends to the left."""
     system = so.library.duffing(c=0.12, k=1.0, alpha=-0.1, F=0.2)
-    small = follow(system, [0.0, 0.0], [0.8, 0.85, 0.87])
-    large = follow(system, [0.0, 0.0], [1.0, 0.93, 0.88, 0.85, 0.84])
+    small = follow(system, [0.0, 0.0], [0.8, 0.87])
+    large = follow(system, [0.0, 0.0], [1.0, 0.9, 0.84])
     assert locate_by_shooting(system, "LP", small, 0.87).omega == pytest.approx(0.873547, abs=6e-7)
     assert locate_by_shooting(system, "LP", large, 0.84).omega == pytest.approx(0.836157, abs=6e-7)
 
@@ -227,4 +227,4 @@ def test_wrong_input_is_refused_and_failure_says_what_to_change():
     with pytest.raises(ConvergenceError, match="Start closer"):
         shoot(system.with_parameters(p=1.7), [3.0, 20.0], 3.5, max_iterations=1)
     with pytest.raises(ConvergenceError, match="no NS found"):
-        locate_by_shooting(system.with_parameters(p=0.55, j=0.0), "NS", [-0.243, 0.0141], 2.304)
+        locate_by_shooting(system.with_parameters(p=0.55, j=0.0), "NS", [-0.243, 0.0141], 2.304, max_iterations=5)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.linalg import expm
+from slow import slow
 
 import suboctave as so
 from suboctave.errors import InputError
@@ -38,7 +39,7 @@ SYSTEMS = {
 
 @pytest.mark.parametrize(
     "name",
-    ["stops", "two", *(pytest.param(name, marks=pytest.mark.slow) for name in ("rounded", "dampers", "text"))],
+    ["stops", *slow("two", "rounded", "dampers", "text")],
 )
 def test_state_transition_matrix(name):
     system = SYSTEMS[name]
