@@ -10,7 +10,6 @@ import pytest
 import xarray as xr
 
 import suboctave as so
-from suboctave.store import files
 from suboctave.store.table import Table
 from suboctave.study.results import Results
 
@@ -239,30 +238,3 @@ def test_complex_columns_of_a_table_come_back_bit_for_bit(tmp_path):
     saved = Results({"numbers": Table({"mu": values, "name": np.array(["a", "b", "c", "d"])})}).save(tmp_path / "t.nc")
     again = so.load(saved)["numbers"]["mu"]
     assert again.tobytes() == values.tobytes()
-
-
-def test_what_is_read_by_hdf5_alone_is_what_xarray_reads(saved, tmp_path, monkeypatch):
-    """Also where there are no events, and where a variable is named as a dimension that it does not lie along."""
-    plain = so.frequency_response(so.library.duffing(c=0.1, F=0.3), (3.0, 2.5), 3).save(tmp_path / "plain.nc")
-    named = tmp_path / "named.nc"
-    dataset = xr.Dataset({"x": ("y", [1.0, 2.0]), "a": ("x", ["one", "", "three"]), "b": ("x", [True, False, True])})
-    files.write(named, {"": dataset}, {})
-    quickly, counted = files._quickly, []
-    for path in (saved, plain, named):
-        with monkeypatch.context() as patched:
-            patched.setattr(files, "_quickly", lambda group: counted.append(quickly(group)) or counted[-1])
-            ours = files.read(path)
-            patched.setattr(files, "_quickly", lambda group: None)
-            theirs = files.read(path)
-        for name, part in theirs.items():
-            xr.testing.assert_identical(ours[name], part)
-            assert {n: v.dtype for n, v in ours[name].variables.items()} == {
-                n: v.dtype for n, v in part.variables.items()
-            }
-    assert all(part is not None for part in counted[:2])
-
-
-def test_what_hdf5_alone_would_lose_xarray_reads(curve, saved, monkeypatch):
-    whole = files._dataset_of
-    monkeypatch.setattr(files, "_dataset_of", lambda group: whole(group).drop_vars("iterations"))
-    branches_equal(curve, so.load(saved))

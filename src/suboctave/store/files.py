@@ -29,15 +29,6 @@ if TYPE_CHECKING:
     import xarray
 
 
-#: attributes of HDF5's dimension scales and of NetCDF, which are none of ours
-_OF_NETCDF = {
-    *("CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "DIMENSION_LABELS"),
-    *("_FillValue", "_Netcdf4Dimid", "_Netcdf4Coordinates", "_NCProperties", "_nc3_strict"),
-}
-#: how the scale of a dimension says that it is no variable
-_ONLY_DIMENSION = b"This is a netCDF dimension but not a netCDF variable"
-#: what NetCDF puts before the name of a variable that is also that of a dimension it does not lie along
-_LIKE_A_DIMENSION = "_nc4_non_coord_"
 _AGAIN = "run the study again, or take a copy that is whole"
 
 
@@ -97,65 +88,13 @@ def _read_groups(source: Path) -> dict[str, xarray.Dataset]:
 
     with h5py.File(source, "r") as file:
         check_layout(file.attrs, str(source))
-        parts: dict[str, h5py.Group] = {"": file}
-        file.visititems(lambda name, item: parts.update({name: item}) if isinstance(item, h5py.Group) else None)
-        found = {name: _quickly(group) for name, group in parts.items()}
+        names: list[str] = []
+        file.visititems(lambda name, item: names.append(name) if isinstance(item, h5py.Group) else None)
     groups = {}
-    for name, quick in found.items():
-        if quick is not None:
-            groups[name] = quick
-            continue
+    for name in ["", *names]:
         with xarray.open_dataset(source, group=name or None, engine="h5netcdf") as dataset:
             groups[name] = dataset.load()
     return groups
-
-
-def _quickly(group: Any) -> xarray.Dataset | None:
-    """A group by HDF5 alone, if its digest says that this is all of it; else xarray has to read it.
-
-    NetCDF's own library asks each variable for the length of each empty dimension: a second for a curve without events.
-    """
-    try:
-        dataset = _dataset_of(group)
-        stated = dataset.attrs["digest"]
-        content = dataset.assign_attrs()
-        del content.attrs["digest"]
-        return dataset if digest(content) == stated else None
-    except Exception:  # whatever it is, the other reader says it
-        return None
-
-
-def _dataset_of(group: Any) -> xarray.Dataset:
-    """A group as xarray reads it: scales are dimensions, texts are str, what was bool is bool."""
-    import h5py
-    import xarray
-
-    variables: dict[str, Any] = {}
-    coordinates: set[str] = set()
-    for key, item in group.items():
-        if not isinstance(item, h5py.Dataset) or item.attrs.get("NAME", b"").startswith(_ONLY_DIMENSION):
-            continue
-        name = key.removeprefix(_LIKE_A_DIMENSION)
-        dims = [name] if "DIMENSION_LIST" not in item.attrs and item.ndim else []
-        dims = dims or [item.dims[axis][0].name.rpartition("/")[2] for axis in range(item.ndim)]
-        attributes = _attributes(item)
-        coordinates |= {name} & set(dims) | set(str(attributes.pop("coordinates", "")).split())
-        values = item[()]
-        if h5py.check_string_dtype(item.dtype):
-            values = np.array(np.asarray(item.asstr()[()]).tolist(), dtype=str).reshape(item.shape)
-        if attributes.get("dtype") == "bool":
-            del attributes["dtype"]
-            values = np.asarray(values, dtype=bool)
-        variables[name] = (dims, values, attributes)
-    attributes = _attributes(group)
-    coordinates |= set(str(attributes.pop("coordinates", "")).split())
-    return xarray.Dataset(variables, attrs=attributes).set_coords(coordinates)
-
-
-def _attributes(item: Any) -> dict[str, Any]:
-    """Attributes of a group or a variable, of which NetCDF keeps numbers as arrays of one."""
-    given = {key: value for key, value in item.attrs.items() if key not in _OF_NETCDF}
-    return {key: value[0] if np.shape(value) == (1,) else value for key, value in given.items()}
 
 
 def _check(part: str, dataset: xarray.Dataset) -> None:
