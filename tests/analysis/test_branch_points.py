@@ -81,7 +81,7 @@ def test_a_pitchfork_is_one_branch_point_from_the_unsymmetric_motions(name):
     item = branch_point(system, omega, near)
     orbit = unsymmetric(item, 0.01)
     ends = (orbit.omega, item.omega - 0.5 * (orbit.omega - item.omega))
-    for max_step in (0.06, 0.3):
+    for max_step in (0.02, 0.06, 0.3):
         there = so.frequency_response(system, ends, start=orbit, max_step=max_step)
         back = so.frequency_response(system, ends, start=there.orbits[-1], max_step=max_step)
         for curve in (there, back):
@@ -91,7 +91,7 @@ def test_a_pitchfork_is_one_branch_point_from_the_unsymmetric_motions(name):
             assert curve.audit.complete
 
 
-@pytest.mark.parametrize("max_step", [0.3, *slow(0.02, 0.04, 0.06, 0.08, 0.15)])
+@pytest.mark.parametrize("max_step", [0.06, 0.3, *slow(0.02, 0.04, 0.08, 0.15)])
 def test_a_pitchfork_at_any_step(max_step):
     """From an unsymmetric motion: which of those at omega = 0.9 a first guess leads to hangs on its last digit."""
     make, omega, near = SYMMETRIC["cubic"]
@@ -127,7 +127,7 @@ def test_an_imperfect_pitchfork_is_a_limit_point_beside_a_smooth_curve():
     orbit = unsymmetric(item)
     mirrored = so.frequency_response(cubic(), (orbit.omega, 0.78), start=orbit).orbits[-1]
     distances = []
-    for share in (1e-3, 1e-5, 1e-7):
+    for share in (1e-3, 1e-5, 1e-7, 1e-9):
         system = cubic(7.5 * share)
         curves = [so.frequency_response(system, (orbit.omega, 0.78), start=s.coefficients) for s in (orbit, mirrored)]
         turning = next(curve for curve in curves if curve.omega[-1] > 0.8)
@@ -135,7 +135,8 @@ def test_an_imperfect_pitchfork_is_a_limit_point_beside_a_smooth_curve():
         assert kinds(smooth) == []
         assert kinds(turning) == ["LP"]
         fold = turning.bifurcations["LP"][0]
-        assert fold.omega == pytest.approx(shot(system, fold), abs=1e-7)
+        if share > 1e-8:
+            assert fold.omega == pytest.approx(shot(system, fold), abs=1e-7)
         distances.append(fold.omega - item.omega)
     slopes = np.diff(np.log(distances)) / np.log(1e-2)
     assert slopes[1:] == pytest.approx(2.0 / 3.0, abs=0.01)

@@ -28,7 +28,7 @@ def van_der_pol():
     """With x = sqrt(mu) y that of van der Pol, mu (y^2 - 1) y'."""
     system = so.System.from_equations("x'' + (x**2 - mu)*x' + x = 0", {"mu": 0.1})
     rule = so.AdaptiveHarmonics(tolerance=1e-9, event_tolerance=1e-10, maximum=255)
-    return so.limit_cycles(hopf_of(system, "mu", (-0.5, 5.5)), (0.0, 5.0), harmonics=rule)
+    return so.limit_cycles(hopf_of(system, "mu", (-0.5, 10.5)), (0.0, 10.0), harmonics=rule)
 
 
 def test_the_period_of_van_der_pol(van_der_pol):
@@ -40,7 +40,8 @@ def test_the_period_of_van_der_pol(van_der_pol):
     for i in [*np.flatnonzero(mu > 0.01)[::12], -1]:
         orbit = van_der_pol.orbits[i]
         assert orbit.omega == pytest.approx(exact(orbit).omega, rel=1e-8)
-        assert orbit.amplitude(0) == pytest.approx(exact(orbit).amplitude, rel=1e-8)
+        if mu[i] < 5.0:
+            assert orbit.amplitude(0) == pytest.approx(exact(orbit).amplitude, rel=1e-8)
     assert van_der_pol.stable.all()
     (end,) = van_der_pol.bifurcations["Hopf"]
     assert abs(end.parameters["mu"]) < 1e-12
@@ -146,9 +147,9 @@ def test_a_period_doubling_against_shooting_and_followed(doubling):
     assert np.abs(exact(found.orbit).multipliers + 1.0).min() < 1e-8
     assert so.verify(found).agrees
     np.testing.assert_array_equal(doubling.stable, doubling.parameter("c") < found.parameters["c"])
-    border = so.track(found, "b", (0.15, 0.3))
-    away = max(border.orbits, key=lambda orbit: abs(orbit.values["b"] - 0.2))
-    assert np.abs(exact(away).multipliers + 1.0).min() < 1e-6
+    border = so.track(found, "b", (0.1, 0.5))
+    for i in (0, -1):
+        assert np.abs(exact(border.orbits[i]).multipliers + 1.0).min() < 1e-6
     assert border.stable.all()
 
 

@@ -236,8 +236,9 @@ def in_words(linear: LinearPart, dofs: int, how: str, declared: UnitSystem | Non
         circular, cycles = declared.frequency, declared.cycles
     units = ((circular, 1.0), (cycles, 2.0 * np.pi))
     shown = [f"{', '.join(f'{w / unit:.6g}' for w in lowest)} {name}" for name, unit in units]
+    unknown = f"{linear.size} unknown displacement{'s' if linear.size > 1 else ''}"
     return (
-        f"Linear part: {dofs} degrees of freedom, {how}; {linear.size} unknown displacement{'s' if linear.size > 1 else ''}\n"
+        f"Linear part: {dofs} degrees of freedom, {how}; {unknown}\n"
         f"  natural frequencies {shown[0]}\n                      {shown[1]}"
     )
 
