@@ -71,6 +71,21 @@ def test_a_pair_beside_a_limit_point_whose_multipliers_err(systems: ModuleType) 
     assert found[i].omega == pytest.approx(0.21832894, rel=1e-7)
 
 
+def test_torus_points_on_either_side_of_a_limit_point(systems: ModuleType) -> None:
+    """A pair leaves the circle and comes back within 3e-7 of omega, with a limit point in between. With the harmonics
+    that suffice for the curve multipliers err by 0.4 there, and the pair seemed to stay inside.
+    """
+    system = systems.system_of(systems.describe(316, strong=False))
+    start = [16.2246, 17.4699, 27.6108, 34.0901, 9.79169, 5.07098, 17.2087, 20.8257]
+    enough, first_points = so.AdaptiveHarmonics(minimum=63), so.SteppingOptions(max_points=8)
+    branch = so.frequency_response(system, (0.34054, 0.746), enough, start=start, stepping=first_points)
+    assert [item.kind for item in branch.bifurcations] == ["NS", "LP", "NS"]
+    # by so.timedomain.locate_by_shooting
+    shot = [0.34056960105526, 0.34056981342756, 0.34056977974450]
+    assert [item.omega for item in branch.bifurcations] == pytest.approx(shot, abs=1e-9)
+    assert not branch.audit.unsettled
+
+
 def test_what_is_in_doubt_at_one_place_is_one_stretch() -> None:
     def stretch(first: float, last: float, reason: str) -> Unsettled:
         return Unsettled("omega", 1.0 + first, 1.0 + last, (first, last), reason)
@@ -122,3 +137,5 @@ def test_a_step_whose_interior_has_no_solution_is_halved(systems: ModuleType) ->
         assert [event[:2] for event in met] == [event[:2] for event in known]
         assert [event[2] for event in met] == pytest.approx([event[2] for event in known], abs=1e-6)
         assert max(event.uncertainty for event in border.bifurcations) < 1e-6
+        # behind a grazing c3 grows as the cube of the inverse speed at which the gap is crossed: no zeros are near
+        assert not any("GPD may lie" in note for note in border.warnings)

@@ -38,8 +38,9 @@ from suboctave.lazy import lazy
 
 #: motions of less than this share of the reference count as rest
 _REST = 1e-8
-#: distance of the critical multiplier from the unit circle up to which harmonics suffice
-_CRITICAL = 1e-3
+#: distance of the critical multiplier from the unit circle, and error of one that may lie on it, up to which harmonics
+#: suffice
+CRITICAL = 1e-3
 #: steps after which that distance is computed again
 CRITICAL_EVERY = 5
 _TINY = float(np.finfo(float).tiny)
@@ -302,9 +303,9 @@ class MotionProblem:
         lower = basis.harmonics < present.harmonics
         if basis.harmonics > present.harmonics or not (lower or self.steps % CRITICAL_EVERY == 0):
             return basis
-        if evaluation.doubt > _CRITICAL:
+        if evaluation.doubt > CRITICAL:
             return next_harmonics(state, adaptive)
-        return present if lower and evaluation.doubt > 0.1 * _CRITICAL else basis
+        return present if lower and evaluation.doubt > 0.1 * CRITICAL else basis
 
     def _in_basis(self, basis: HarmonicBasis) -> HarmonicBalance:
         if basis is self.balance.basis or basis == self.balance.basis:
