@@ -216,7 +216,9 @@ class _Follower(Driver):
         if worst.doubt <= CRITICAL:
             return None
         basis = next_harmonics(worst.state, rule)
-        return worst.curve.finer(worst.state, basis)[0] if basis.size > worst.state.basis.size else None
+        if basis.size <= worst.state.basis.size:
+            return None
+        return replace(worst.curve.finer(worst.state, basis)[0], erred=worst.doubt)
 
     def _arrival(self) -> Bifurcation | None:
         """The bifurcation of another curve that this one ends at."""
