@@ -210,10 +210,13 @@ class _Follower(Driver):
         """The curve with more harmonics, where those of a step leave it open whether a multiplier passes the circle."""
         self._candidate = new = self._sample(b)
         old, rule = self.previous, new.curve.adaptive
-        if rule is None or old is None or old.at_rest or new.at_rest:
+        # where sub-harmonic motions are born and end depends on their harmonics
+        if rule is None or old is None or old.at_rest or new.at_rest or new.state.basis.nu > 1:
             return None
-        worst = max(self._guard.examined(self._solved_again(old, new), new).inside, key=lambda sample: sample.doubt)
-        if worst.doubt <= CRITICAL:
+        inside = self._guard.examined(self._solved_again(old, new), new).inside
+        worst = max(inside, key=lambda sample: sample.doubt)
+        quiet = len(inside) == 2 and old.unstable == new.unstable
+        if quiet or worst.doubt <= CRITICAL:
             return None
         basis = next_harmonics(worst.state, rule)
         if basis.size <= worst.state.basis.size:
