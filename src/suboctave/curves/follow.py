@@ -215,8 +215,7 @@ class _Follower(Driver):
             return None
         inside = self._guard.examined(self._solved_again(old, new), new).inside
         worst = max(inside, key=lambda sample: sample.doubt)
-        quiet = len(inside) == 2 and old.unstable == new.unstable
-        if quiet or worst.doubt <= CRITICAL:
+        if worst.doubt <= CRITICAL:
             return None
         basis = next_harmonics(worst.state, rule)
         if basis.size <= worst.state.basis.size:
