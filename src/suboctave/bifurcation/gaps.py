@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from suboctave.harmonic.aft.closed_form import corner_weights
 from suboctave.harmonic.aft.law import LocalMotion
 from suboctave.harmonic.basis import Array
 from suboctave.harmonic.evaluation import BalanceState
@@ -51,6 +52,15 @@ def gap_extrema(state: BalanceState) -> tuple[GapExtrema, ...]:
                 turns = extrema(channel.along.motion, *grid)
                 gaps += [GapExtrema(member.number, place, level, *turns) for place, level in enumerate(places)]
     return tuple(gaps)
+
+
+def crossing_speeds(state: BalanceState) -> Array:
+    """Moduli of du/dtau where a motion crosses the gaps of piecewise-linear laws."""
+    packed, slownesses = state.packed, [np.zeros(0)]
+    for motion, first, last in zip(state.motions, packed.first, packed.first[1:], strict=False):
+        unit = packed.pieces[first:last] * [0.0, 1.0, 0.0] + [1.0, 0.0, 1.0]
+        slownesses.append(corner_weights(motion, unit, *state.balance.grid)[2])
+    return 1.0 / np.concatenate(slownesses)
 
 
 def levels(local: LocalMotion) -> tuple[float, ...]:

@@ -150,6 +150,9 @@ class March:
         shorter than `min_step` already).
     arrive
         Called with two neighbours; where the curve meets another one between them and ends there, it says so.
+    finer
+        Called with two neighbours; the discretisation of the curve in which the step has to be taken again, None as a
+        rule.
     home
         A point already passed, in the direction of its tangent, at which the curve is closed; default: the start.
     others
@@ -163,6 +166,7 @@ class March:
     stepping: SteppingOptions
     inspect: Callable[[CurvePoint, CurvePoint], bool] | None = None
     arrive: Callable[[CurvePoint, CurvePoint], Arrival | None] | None = None
+    finer: Callable[[CurvePoint, CurvePoint], Curve | None] | None = None
     home: CurvePoint | None = None
     others: Sequence[Range] = ()
     closed: bool = field(default=False, init=False)
@@ -204,6 +208,10 @@ class March:
                 if arrival.point is not None:
                     yield arrival.point
                 return
+            finer = None if self.finer is None else self.finer(point, new)
+            if finer is not None:
+                curve = finer
+                continue
             largest = max(largest, new.curve.size(new.u))
             back = None if count < 3 else home.passed(point, new)
             if back is not None:

@@ -33,11 +33,12 @@ from suboctave.curves.guard import Crossing, GuardedStep, StepGuard
 from suboctave.curves.identity import relation
 from suboctave.curves.junction import UNSEEN, Meeting, meeting
 from suboctave.curves.ledgers import REASON, CountCheck, DoublingWatch, HiddenDoublings, pair_in
-from suboctave.curves.motion import MotionProblem
+from suboctave.curves.motion import CRITICAL, MotionProblem
 from suboctave.curves.refine import bifurcation_at, solved_bifurcation, solved_in, turns_at
 from suboctave.curves.sample import Sample
 from suboctave.curves.trace import Settings, Trace, joined
 from suboctave.errors import ConvergenceError, InputError
+from suboctave.harmonic.truncation import next_harmonics
 from suboctave.interruption import Interruption
 
 #: amplitude, unit of length, up to which a motion is rest here: that of located branch points of rest is rounding
@@ -137,7 +138,8 @@ def follow(start: CurvePoint, direction: float, bounds: tuple[float, float], set
 class _Follower(Driver):
     def __init__(self, start: CurvePoint, direction: float, bounds: tuple[float, float], settings: Settings) -> None:
         super().__init__(settings)
-        self.march = March(start, direction, bounds, settings.newton, settings.stepping, self._clear, self._arrived)
+        hooks = self._clear, self._arrived, self._finer
+        self.march = March(start, direction, bounds, settings.newton, settings.stepping, *hooks)
         self._candidate: Sample | None = None
         self._guard = StepGuard(self._between, self._crossing)
         #: the step that is searched
@@ -208,6 +210,22 @@ class _Follower(Driver):
         """How the curve ends between two neighbours, if it meets another one there."""
         known = self._meeting
         return known[2].arrival if known is not None and known[0] is a and known[1] is b else None
+
+    def _finer(self, a: CurvePoint, b: CurvePoint) -> MotionProblem | None:
+        """The curve with more harmonics, where those of a step leave it open whether a multiplier passes the circle."""
+        self._candidate = new = self._sample(b)
+        old, rule = self.previous, new.curve.adaptive
+        # where sub-harmonic motions are born and end depends on their harmonics
+        if rule is None or old is None or old.at_rest or new.at_rest or new.state.basis.nu > 1:
+            return None
+        inside = self._guard.examined(self._solved_again(old, new), new).inside
+        worst = max(inside, key=lambda sample: sample.doubt)
+        if worst.doubt <= CRITICAL:
+            return None
+        basis = next_harmonics(worst.state, rule)
+        if basis.size <= worst.state.basis.size:
+            return None
+        return replace(worst.curve.finer(worst.state, basis)[0], erred=worst.doubt)
 
     def _arrival(self) -> Bifurcation | None:
         """The bifurcation of another curve that this one ends at."""

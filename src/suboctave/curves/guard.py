@@ -85,14 +85,14 @@ class StepGuard(Steps):
 
     def refuses(self, old: Sample, new: Sample) -> bool:
         """True if a step has left its curve, or hides more than can be told while it is that long."""
-        step = self._examined(old, new)
+        step = self.examined(old, new)
         if step.refused:
             self.audit = replace(self.audit, refused=self.audit.refused + 1)
         return step.refused
 
     def passage(self, old: Sample, new: Sample) -> GuardedStep:
         """The way between two neighbours, looked at, the step being accepted."""
-        step, audit = self._examined(old, new), self.audit
+        step, audit = self.examined(old, new), self.audit
         known, self.turned = [*audit.unsettled, *step.unsettled], step.turned
         if self.turned is not None:
             # known now, it explains what was in doubt right before it
@@ -113,7 +113,8 @@ class StepGuard(Steps):
         super().forget()
         self.turned = None
 
-    def _examined(self, old: Sample, new: Sample) -> GuardedStep:
+    def examined(self, old: Sample, new: Sample) -> GuardedStep:
+        """The way between two neighbours, looked at."""
         if self._last is None or self._last.old is not old or self._last.new is not new:
             self._last = GuardedStep(self, old, new)
         return self._last

@@ -38,8 +38,9 @@ from suboctave.lazy import lazy
 
 #: motions of less than this share of the reference count as rest
 _REST = 1e-8
-#: distance of the critical multiplier from the unit circle up to which harmonics suffice
-_CRITICAL = 1e-3
+#: distance of the critical multiplier from the unit circle, and error of one that may lie on it, up to which harmonics
+#: suffice
+CRITICAL = 1e-3
 #: steps after which that distance is computed again
 CRITICAL_EVERY = 5
 _TINY = float(np.finfo(float).tiny)
@@ -159,6 +160,9 @@ class MotionProblem:
         Values of parameters that are not those of the equations.
     steps
         How many steps lie behind.
+    erred
+        Error of a multiplier that fewer harmonics left on either side of the unit circle, 0 where they did not: as long
+        as one is that close to it none are taken away.
     """
 
     balance: HarmonicBalance
@@ -173,6 +177,7 @@ class MotionProblem:
     cache: dict[HarmonicBasis, HarmonicBalance] = field(default_factory=dict)
     held: Mapping[str, float] = field(default_factory=dict)
     steps: int = 0
+    erred: float = 0.0
 
     def __post_init__(self) -> None:
         self.cache.setdefault(self.balance.basis, self.balance)
@@ -293,18 +298,21 @@ class MotionProblem:
         if balance.basis != self.balance.basis:
             augmentation = augmentation.resized(balance.basis, balance.size)
         force = max(state.balanced.scale, self.least_force(state))
-        return replace(self, balance=balance, augmentation=augmentation, force=force, steps=self.steps + 1)
+        erred = self.erred if balance.basis.harmonics >= self.balance.basis.harmonics else 0.0
+        return replace(self, balance=balance, augmentation=augmentation, force=force, steps=self.steps + 1, erred=erred)
 
     def _basis(self, evaluation: MotionEvaluation, adaptive: AdaptiveHarmonics) -> HarmonicBasis:
         """The basis that a point needs: a small neglected motion may still matter where a stiff contact just closes."""
         state, present = evaluation.state, self.balance.basis
         basis = choose_harmonics(state, adaptive, self.tolerance)
         lower = basis.harmonics < present.harmonics
+        if lower and self.erred > 0.0 and evaluation.floquet.clearance <= self.erred:
+            return present
         if basis.harmonics > present.harmonics or not (lower or self.steps % CRITICAL_EVERY == 0):
             return basis
-        if evaluation.doubt > _CRITICAL:
+        if evaluation.doubt > CRITICAL:
             return next_harmonics(state, adaptive)
-        return present if lower and evaluation.doubt > 0.1 * _CRITICAL else basis
+        return present if lower and evaluation.doubt > 0.1 * CRITICAL else basis
 
     def _in_basis(self, basis: HarmonicBasis) -> HarmonicBalance:
         if basis is self.balance.basis or basis == self.balance.basis:

@@ -15,7 +15,7 @@ import numpy as np
 
 from suboctave.bifurcation import measures
 from suboctave.bifurcation.bordered import NullVectors, null_vectors
-from suboctave.bifurcation.gaps import GapExtrema, gap_extrema
+from suboctave.bifurcation.gaps import GapExtrema, crossing_speeds, gap_extrema
 from suboctave.bifurcation.normal_form import cubic_coefficient, responding
 from suboctave.continuation.linear import Factor, LeadingBlock, length
 from suboctave.continuation.point import CurvePoint
@@ -88,6 +88,14 @@ class Sample:
         return self.method.along(self.state)
 
     @lazy
+    def doubt(self) -> float:
+        """How far off a multiplier may be that may lie on either side of the unit circle; 0 if there is none."""
+        result = self.floquet
+        if self.at_rest or result.undamped or result.decided:
+            return 0.0
+        return float(result.errors[result.open].max(initial=0.0))
+
+    @lazy
     def verdict(self) -> FloquetResult:
         """Multipliers whose errors cover what det J_0 and det J_half say of them."""
         if self.at_rest:
@@ -137,6 +145,13 @@ class Sample:
             heights = ((i, level - value if curve > 0.0 else value - level) for i, (value, curve) in turns)
             found.append({i: height for i, height in heights if 0.0 < height < most})
         return found
+
+    @lazy
+    def brevity(self) -> float:
+        """Logarithm of how much second derivatives grow with the contacts that are about to end: mean over the two ends
+        of each of `1 / |du/dtau|`, which is as large as the contact is short, multiplied. Third ones grow as its cube.
+        """
+        return -0.5 * float(np.log(crossing_speeds(self.state)).sum())
 
     @lazy
     def slope(self) -> float:

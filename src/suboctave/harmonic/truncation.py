@@ -86,10 +86,13 @@ def _rungs(lowest: int, most: float, otherwise: int) -> tuple[int, ...]:
 
 
 def next_harmonics(state: BalanceState, options: AdaptiveHarmonics) -> HarmonicBasis:
-    """A basis with half as many harmonics again, where the options allow it, else the present ones."""
+    """A basis with half as many harmonics again, or as many as the options allow; the present one where that is not
+    more.
+    """
     nu, high = state.basis.nu, state.basis.harmonics
-    wanted = next((h for h in _rungs(*_limits(options, state), high // nu) if h * nu >= 1.5 * high), None)
-    return state.basis if wanted is None else HarmonicBasis(wanted * nu, nu)
+    rungs = _rungs(*_limits(options, state), high // nu)
+    wanted = next((h for h in rungs if h * nu >= 1.5 * high), rungs[-1])
+    return HarmonicBasis(wanted * nu, nu) if wanted * nu > high else state.basis
 
 
 def _expected(tail: Array, high: int, bound: float) -> float:

@@ -49,6 +49,8 @@ class BifurcationKind(ABC):
     name: str
     operator: Kind
     formulation: Formulation = BORDERED
+    #: whether multipliers tell, those of the completed motion, and what is solved for belongs to the truncated one
+    counted: bool = False
 
     def __init__(self, formulation: Formulation = BORDERED) -> None:
         self.formulation = formulation
@@ -134,6 +136,7 @@ class NeimarkSacker(BifurcationKind):
 
     name = "NS"
     operator = Kind.FREE
+    counted = True
 
     def changed(self, a: Sample, b: Sample) -> bool:
         """Count of unstable multipliers changed by more than LP, BP and PD account for."""
@@ -230,7 +233,8 @@ def _nearest(sample: Sample, target: float) -> float:
 
 #: fractions of a step by which rounding may carry a solution beyond its ends
 _SLACK = 1e-7
-#: the same before the first point of a curve, which may be the bifurcation as its multipliers tell, not its harmonics
+#: the same before the first point of a curve, which may be the bifurcation as its multipliers tell, not its harmonics,
+#: and beyond ends at which multipliers, if these tell of the kind, leave it open on which side they lie
 _BEFORE = 1e-2
 #: corrections of a place on a step, at most, and one that settles it, as a share of the step
 _ROUNDS, _SETTLED = 20, 1e-12
@@ -265,6 +269,7 @@ def locate(
     """
     low, high = 0.0, 1.0
     at_low, at_high = a, b
+    before, behind = (_BEFORE if kind.counted and not end.floquet.decided else _SLACK for end in (a, b))
     for depth in range(bisections):
         share = kind.fraction(at_low, at_high)
         nearer = at_low if share < 0.5 else at_high
@@ -275,7 +280,7 @@ def locate(
             # here
             if attempt is not None:
                 place = low + attempt[1] * (high - low)
-                if -(_BEFORE if begins else _SLACK) <= place <= 1.0 + _SLACK:
+                if -(_BEFORE if begins else before) <= place <= 1.0 + behind:
                     return Located(kind, min(1.0, max(place, 0.0)), nearer, attempt[0], 0.0)
         middle = None
         for part in (0.5, 0.4, 0.65):

@@ -242,6 +242,10 @@ class Cusp(CurveTest):
     def value(self, sample: Sample) -> float:
         return sample.bend
 
+    def smooth(self, sample: Sample) -> tuple[float, float]:
+        sign, size = super().smooth(sample)
+        return sign, size - sample.brevity
+
 
 @dataclass(frozen=True)
 class GeneralisedDoubling(CurveTest):
@@ -255,7 +259,8 @@ class GeneralisedDoubling(CurveTest):
 
     def smooth(self, sample: Sample) -> tuple[float, float]:
         sign, size = super().smooth(sample)
-        return sign, size + sample.fold[1]
+        # short contacts enter by the third derivative
+        return sign, size + sample.fold[1] - 3.0 * sample.brevity
 
 
 @dataclass(frozen=True)
