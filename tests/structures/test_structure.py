@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 import scipy.linalg
 import scipy.sparse
 
 import suboctave as so
+from suboctave.errors import InputError
 
 
 def beam(elements: int) -> so.Structure:
@@ -384,3 +387,11 @@ def test_observed_by_name():
     assert so.condense(system, 100.0, observe="2 z").size == so.condense(system, 100.0, observe=[middle]).size
     with pytest.raises(so.InputError, match=r"'2 zz' is none of the degrees of freedom \(did you mean"):
         so.frequency_response(system, (100.0, 101.0), harmonics=3, observe="2 zz")
+
+
+@pytest.mark.parametrize(
+    ("dof", "number"), [(("node 1042", "z"), "structure.dof('node 1042', 'z')"), ("a", "structure.dof('a')")]
+)
+def test_a_place_by_its_label_is_refused_with_what_to_write(dof, number):
+    with pytest.raises(InputError, match=re.escape(f"has the number {number}")):
+        so.ElasticStop(dof, 1.0, 0.1)

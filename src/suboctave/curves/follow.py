@@ -225,7 +225,10 @@ class _Follower(Driver):
         basis = next_harmonics(worst.state, rule)
         if basis.size <= worst.state.basis.size:
             return None
-        return replace(worst.curve.finer(worst.state, basis)[0], erred=worst.doubt)
+        try:
+            return replace(worst.curve.finer(worst.state, basis)[0], erred=worst.doubt)
+        except ConvergenceError:
+            return None
 
     def _arrival(self) -> Bifurcation | None:
         """The bifurcation of another curve that this one ends at."""

@@ -52,10 +52,14 @@ class Place:
                 raise InputError(text, ("direction",))
             self.vector.setflags(write=False)
             return
-        given = tuple(dof) if isinstance(dof, Sequence | np.ndarray) else (dof,)
+        asked: Any = dof
+        given = tuple(asked) if isinstance(asked, Sequence | np.ndarray) and not isinstance(asked, str) else (asked,)
         with located("dof"):
             if len(given) not in (1, 2) or any(isinstance(e, bool) or not isinstance(e, Integral) for e in given):
-                raise InputError(f"{owner}: dof must be an integer or a pair of integers, not {dof!r}")
+                named = any(isinstance(entry, str) for entry in given)
+                called = f"structure.dof({', '.join(map(repr, given))})"
+                hint = f"; what a structure calls so has the number {called}" if named else ""
+                raise InputError(f"{owner}: dof must be an integer or a pair of integers, not {dof!r}{hint}")
             self.dofs = tuple(int(entry) for entry in given)
             if min(self.dofs) < 0:
                 raise InputError(f"{owner}: dof {min(self.dofs)} is negative; degrees of freedom count from 0")
