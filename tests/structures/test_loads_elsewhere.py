@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import suboctave as so
+from suboctave.errors import InputError
 from suboctave.harmonic import HarmonicBalance, HarmonicBasis, StructuralMatrices
 from suboctave.harmonic.energy import mean_energy
 
@@ -134,3 +135,22 @@ def whole_motion(orbit):
     x = np.zeros((orbit.basis.size, N))
     x[1], x[2] = c.real, -c.imag
     return x
+
+
+def test_a_linear_part_of_other_loads_is_refused():
+    linear = so.condense(chain(), 1.0)
+    with pytest.raises(InputError, match="made for other loads"):
+        so.frequency_response(chain(so.HarmonicLoad(2, "p", phase="phi")), OMEGA, linear=linear)
+    # loads that the unknowns hold, and others of the same place, do not matter
+    for loads in ([so.HarmonicLoad(N - 1, "p", phase="phi")], [so.HarmonicLoad(1, "2*p", phase="phi")]):
+        so.frequency_response(chain(*loads), (0.88, 0.881), linear=linear, harmonics=3)
+
+
+def test_the_base_moves():
+    """A load along all degrees of freedom."""
+    stiffness = 2.0 * np.eye(N) - np.eye(N, k=1) - np.eye(N, k=-1)
+    base = so.BaseAcceleration(0.2, np.ones(N))
+    system = so.System(np.eye(N), 0.06 * stiffness, stiffness, [so.ElasticStop(N - 1, 3.0, 0.5)], [base])
+    small, full = so.frequency_response(system, (0.4, 0.41), harmonics=7), whole(system, (0.4, 0.41), harmonics=7)
+    assert small.orbits[0].balance.size == 1
+    np.testing.assert_allclose(small.orbits[0].coefficients, full.orbits[0].coefficients, atol=1e-9)

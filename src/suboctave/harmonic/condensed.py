@@ -180,7 +180,7 @@ class Condensed:
         self.held = held
         self.reduction, self.projected, self.values = reduction, reduction.projected, dict(values)
         self.system = reduction.system
-        self.size = len(reduction.directions)
+        self.size, self.loads = len(reduction.directions), reduction.loads
         self.covers = self.projected.covers
         #: the part at the last other values, and one that covers more
         self._other: Condensed | None = None

@@ -85,8 +85,14 @@ class Equations:
         #: what loads depend on, or what they do to the unknowns
         self.load_names = {n for c in components for n in c.amplitude.names | c.phase.names}
         self._load_order = sorted(self.load_names)
-        if any(shape is None for shape in self._load_shapes):
+        elsewhere = [c.direction for c, shape in zip(components, self._load_shapes, strict=True) if shape is None]
+        if elsewhere:
             self.load_names |= {"omega", *self.matrix_names}
+            if not np.array_equal(elsewhere, self.linear.loads):
+                raise InputError(
+                    "the linear part was made for other loads than this system has: make it with "
+                    "so.condense(system, ...) of this system"
+                )
         #: names that every element's coefficients depend on
         self._names = [tuple(sorted({n for c in e.coefficients for n in c.names})) for e in system.elements]
         self._all_names = sorted({name for names in self._names for name in names})

@@ -32,9 +32,12 @@ from suboctave.units import UnitSystem
 
 @runtime_checkable
 class LinearPart(Protocol):
-    """Contract of the linear part. `size` is the number of unknown DOFs."""
+    """Contract of the linear part. `size` is the number of unknown DOFs; `loads` the directions of loads (l, n) that
+    these do not hold.
+    """
 
     size: int
+    loads: Array
 
     @property
     def words(self) -> tuple[str, ...]:
@@ -111,6 +114,7 @@ class StructuralMatrices:
         self.system = system
         self.values = dict(system.parameters if values is None else values)
         self.size = system.n
+        self.loads = np.zeros((0, system.n))
         #: M, C, K, S, shape (4, n, n)
         self.matrices = np.array([matrix.value(self.values) for matrix in system.linear_parts])
 
