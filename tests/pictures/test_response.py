@@ -6,6 +6,7 @@ import sys
 import numpy as np
 import pytest
 
+import suboctave as so
 from suboctave.errors import InputError
 from suboctave.pictures import plot_panels, plot_response, save_figure
 from suboctave.pictures.style import KINDS
@@ -133,6 +134,12 @@ def test_an_unknown_suffix_and_a_wrong_object_are_refused(duffing, tmp_path):
     newer = duffing().assign_attrs(layout=999)
     with pytest.raises(InputError, match="newer than"):
         plot_response(newer)
+
+
+def test_what_draws_itself_is_named():
+    branch = so.frequency_response(so.library.duffing(c=0.2, alpha=0.1, F=0.1), (0.5, 0.52), harmonics=3)
+    with pytest.raises(InputError, match=r"not BranchVerification, which is drawn by its own plot\(\)"):
+        so.plot(so.verify(branch, points=1, bifurcations=False))
 
 
 def test_no_global_plotting_state():

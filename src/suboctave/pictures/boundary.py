@@ -16,6 +16,7 @@ Isolas are drawn from the dataset that `suboctave.store.layout` describes, given
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
@@ -567,7 +568,9 @@ def _datasets(item: Any, view: View) -> list[xarray.Dataset]:
 
     if isinstance(item, xarray.Dataset):
         return [item]
-    if not hasattr(item, "to_xarray"):
-        raise InputError(f"plot draws branches, diagrams, isolas and their datasets, not {type(item).__name__}")
-    given = item.to_xarray(readings=view.readings(getattr(item, "nu", 0)))
+    laid_out = getattr(item, "to_xarray", None)
+    if laid_out is None or "readings" not in inspect.signature(laid_out).parameters:
+        kind, own = type(item).__name__, ", which is drawn by its own plot()" if hasattr(item, "plot") else ""
+        raise InputError(f"plot draws branches, diagrams, isolas and their datasets, not {kind}{own}")
+    given = laid_out(readings=view.readings(getattr(item, "nu", 0)))
     return list(given.values()) if isinstance(given, dict) else [given]
