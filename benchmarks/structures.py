@@ -4,11 +4,11 @@
     python benchmarks/structures.py --large      also the plate of 100 000
     python benchmarks/structures.py --tracks     also a doubling on the plates, its branch and its border
 
-Columns: degrees of freedom, what holds it, seconds until the linear part is ready (assembly and compiling left out),
-the highest memory of the process in GB, modes of the projection, error of its flexibility at (H + 1/2) omega_max
-against a direct solution of the whole structure, points of a response with stability and events, milliseconds for each
-point (of the processor, the best of three runs), and how many events were located. Fifteen harmonics, one thread of
-linear algebra. Ratios within one run count: the first line is one mass.
+Columns: degrees of freedom, what holds it, seconds until the linear part is ready (without assembly, compiling, and the
+direct solution that tells the error), the highest memory of the process in GB, modes of the projection, error of its
+flexibility at (H + 1/2) omega_max against a direct solution of the whole structure, points of a response with stability
+and events, milliseconds for each point (of the processor, the best of three runs), and how many events were located.
+Fifteen harmonics, one thread of linear algebra. Ratios within one run count: the first line is one mass.
 """
 
 from __future__ import annotations

@@ -41,14 +41,7 @@ SYSTEMS = {
 }  # fmt: skip
 
 
-#: the others have all of its laws
-LEFT = "one DOF, corners and friction"
-
-
-@pytest.fixture(
-    scope="module",
-    params=[pytest.param(name, marks=pytest.mark.slow if name == LEFT else ()) for name in SYSTEMS],
-)
+@pytest.fixture(scope="module", params=SYSTEMS, ids=list(SYSTEMS))
 def motions(request):
     make, bounds, wanted = SYSTEMS[request.param]
     system = make()

@@ -58,6 +58,7 @@ def crossing_speeds(state: BalanceState) -> Array:
     """Moduli of du/dtau where a motion crosses the gaps of piecewise-linear laws."""
     packed, slownesses = state.packed, [np.zeros(0)]
     for motion, first, last in zip(state.motions, packed.first, packed.first[1:], strict=False):
+        # of unit stiffness, on the side above, so that the weight is the inverse speed
         unit = packed.pieces[first:last] * [0.0, 1.0, 0.0] + [1.0, 0.0, 1.0]
         slownesses.append(corner_weights(motion, unit, *state.balance.grid)[2])
     return 1.0 / np.concatenate(slownesses)

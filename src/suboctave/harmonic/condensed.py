@@ -189,6 +189,7 @@ class Condensed:
         self._last: tuple[NDArray[Any], tuple[Blocks, ComplexArray, ComplexArray], dict[Any, Any]] | None = None
         #: M, C, K, S, (4, r, r)
         self._matrices = np.array([matrix.value(values) for matrix in self.projected.matrices])
+        #: the loads' directions in the equation of motion, (l, N)
         self._loads = self.seen(reduction.loads)
 
     @property
@@ -536,9 +537,8 @@ def unknown_directions(system: System, held: Sequence[int] = ()) -> Array:
 
 def acting(system: System) -> Array:
     """Independent directions (m, n) that elements read and act along and loads act along, in the order met."""
-    return independent([*unknown_directions(system), *(c.direction for c in system.load_components())]).reshape(
-        -1, system.n
-    )
+    loads = [c.direction for c in system.load_components()]
+    return independent([*unknown_directions(system), *loads]).reshape(-1, system.n)
 
 
 def independent(rows: Sequence[Array]) -> Array:

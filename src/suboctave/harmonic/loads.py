@@ -53,14 +53,12 @@ class LoadSpectrum:
         """Complex amplitude of the force at a multiple of omega along a direction (n,), or on a degree of freedom,
         differentiated as `value`.
         """
-        return (
-            sum(
-                _wave(c, values, names) * float(c.direction[along] if isinstance(along, int) else c.direction @ along)
-                for c, _ in self.components
-                if c.harmonic == harmonic and _touched(c, names)
-            )
-            + 0.0j
+        waves = (
+            _wave(c, values, names) * float(c.direction[along] if isinstance(along, int) else c.direction @ along)
+            for c, _ in self.components
+            if c.harmonic == harmonic and _touched(c, names)
         )
+        return sum(waves, 0.0j)
 
     def strongest(self, harmonic: int, values: Mapping[str, float]) -> int:
         """The degree of freedom on which the force at a multiple of omega is largest; -1 without one."""

@@ -96,8 +96,7 @@ class PeriodicOrbit:
     @cached_property
     def _moving(self) -> ComplexArray:
         """Complex amplitudes of the linear part's equation of motion, (H + 1, N)."""
-        waves = self.balance.loads.waves({**self.values, "omega": self.omega})
-        return self._linear.recovered(self.basis.multiples * self.omega, to_complex(self.x), waves)
+        return fed(self.state(), self.zeta).recovered
 
     @property
     def amplitudes(self) -> ComplexArray:

@@ -219,7 +219,8 @@ class Reduction:
                 last, known = (_flexibilities(small, seen, top) for small, seen in (before, here))
                 settled = _change(last, known) <= max(_SETTLED, 3.0 * worst)
             if settled or basis.count >= min(_MOST, self.system.n):
-                self._shapes, self._small = basis.shapes, basis.small
+                # without the room beside them
+                self._shapes, self._small = basis.shapes.copy(), basis.small
                 return worst
             before = here
             basis.add(lacking)

@@ -57,18 +57,18 @@ class LimitCycle(Augmentation):
     def at(self, state: BalanceState, extra: Array, names: tuple[str, ...]) -> CycleEquations:
         return CycleEquations(self, state, names)
 
-    def held(self, state: BalanceState) -> tuple[Array, Array]:
+    def phase_condition(self, state: BalanceState) -> tuple[Array, Array]:
         """The reference's oscillation, weighted as `oscillating`, and the derivative of the phase condition by X,
         (dimension,): the same at all motions of a discretisation.
         """
-        weights, known = state.balance.scales()[0], vars(self).get("_held")
+        weights, known = state.balance.scales()[0], vars(self).get("_condition")
         if known is None or known[0] is not weights:
             reference = self.reference * weights
             reference[0] = 0.0
             # D Y
             turning = state.basis.derivative(reference)
             row = (turning * weights).ravel() / ((length(turning) or 1.0) * self.size)
-            known = vars(self)["_held"] = weights, (reference, row)
+            known = vars(self)["_condition"] = weights, (reference, row)
         kept: tuple[Array, Array] = known[1]
         return kept
 
@@ -88,7 +88,7 @@ class CycleEquations(Equations):
 
     def __init__(self, of: LimitCycle, state: BalanceState, names: tuple[str, ...]) -> None:
         self.of, self.state, self.names = of, state, names
-        self.reference, self.row = of.held(state)
+        self.reference, self.row = of.phase_condition(state)
 
     @property
     def values(self) -> Array:

@@ -94,7 +94,10 @@ class FollowingStep(Step):
         # displacements along which no element acts are no unknowns
         size = len(unknown_directions(around.system)) or around.system.n
         if isinstance(self.harmonics, int) and (2 * self.harmonics + 1) * size > _MOST:
-            yield ("harmonics",), f"with forces along {size} DOFs that is too many unknowns: keep fewer harmonics"
+            yield (
+                ("harmonics",),
+                f"with elements along {size} directions that is too many unknowns: keep fewer harmonics",
+            )
 
 
 class AlongParameter(FollowingStep):
