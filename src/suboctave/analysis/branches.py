@@ -23,8 +23,9 @@ from suboctave.continuation.linear import length
 from suboctave.continuation.problem import Array
 from suboctave.curves.events.locate import Singular
 from suboctave.curves.follow import both_ways, follow, same_event
-from suboctave.curves.junction import UNSEEN, beside, curvature_of, emanating, period_name
+from suboctave.curves.junction import UNSEEN, Beside, beside, curvature_of, emanating, period_name
 from suboctave.curves.motion import MotionProblem
+from suboctave.curves.multiple import branch_beside, first_beside
 from suboctave.curves.starts import Harmonics, harmonics_of, linear_up_to, own_linear_part, start_point
 from suboctave.curves.trace import BranchPoint, Settings, Trace
 from suboctave.errors import ConvergenceError, InputError, is_number
@@ -227,6 +228,8 @@ def from_end(curve: MotionProblem, start: Any, run: CurveRun, call: str) -> Trac
 
 #: share by which forces must deviate from linear ones for a motion to count as nonlinear
 _NOTICED = 0.01
+#: distance from a multiple branch point, in scaled arclength, at which the direction of a branch is told
+_BESIDE = 1e-3
 #: size of a motion, in units of a direction, that is taken for the natural one where all forces are linear
 _LARGEST = 1e12
 
@@ -328,19 +331,31 @@ def _doubled(item: Bifurcation, curve: MotionProblem, sign: float, run: CurveRun
 
 def _other(item: Bifurcation, curve: MotionProblem, side: int | None, run: CurveRun) -> Trace:
     """The branch that crosses another at a branch point, or one half of it."""
-    state = item.orbit.state()
-    equation = branching_equation(state, curve.name, curve.span, item.null_vectors)
+    curve, u = _at(item, curve)
+    direction = _along_null_vector(item, curve, u) if item.multiplicity > 1 else _of_two(item, curve)
+    _scale_from_rest(curve, u, direction)
+    if side is None:
+        return leave_along(item, curve, direction, run)
+    return _departing(item, curve, u, side * direction, run)
+
+
+def _of_two(item: Bifurcation, curve: MotionProblem) -> Array:
+    """The direction of the branch that crosses another at a simple branch point."""
+    equation = branching_equation(item.orbit.state(), curve.name, curve.span, item.null_vectors)
     if item.tangent is None:
         # the branch that it was found on is unknown: that which follows the parameter most
         direction = min(equation.directions, key=lambda d: abs(d[-1]))
     else:
         direction = equation.other(np.array(item.tangent))
-    direction = _oriented(direction, equation.weights)
-    curve, u = _at(item, curve)
-    _scale_from_rest(curve, u, direction)
-    if side is None:
-        return leave_along(item, curve, direction, run)
-    return _departing(item, curve, u, side * direction, run)
+    return _oriented(direction, equation.weights)
+
+
+def _along_null_vector(item: Bifurcation, curve: MotionProblem, u: Array) -> Array:
+    """The direction of a branch that leaves a multiple branch point along one of its null vectors."""
+    weights, state = curve.weights(u, 0.0), item.orbit.state()
+    way = curve.join(item.null_vectors.right * state.balance.row_weights(state.x.size), 0.0)
+    there = branch_beside(curve, u, weights, way / length(weights * way), _BESIDE)
+    return _oriented(there / length(weights * there), weights)
 
 
 def _departing(item: Bifurcation, curve: MotionProblem, u: Array, direction: Array, run: CurveRun) -> Trace:
@@ -425,6 +440,19 @@ def _away(
     x, omega, values = curve.split(u)
     curve = curve.with_balance(curve.balance.settle(x, omega, values))
     # over the period of the branch
+    if item.multiplicity > 1:
+        close = first_beside(curve, u, weights, direction / length(weights * direction))
+    else:
+        close = _closest(item, curve, u, direction, settings)
+    if not close.smooth:
+        own = close.point.curve
+        notes.append(f"between {curve.where(u)} and {own.where(close.point.u)}: {UNSEEN}")
+    return close.point
+
+
+def _closest(item: Bifurcation, curve: MotionProblem, u: Array, direction: Array, settings: Settings) -> Beside:
+    """The point right beside a simple bifurcation, in the harmonics that it needs."""
+    weights = curve.weights(u, 0.0)
     expected = item.floquet.multipliers ** (2 if item.kind == "PD" else 1)
     leads = curvature_of(item.normal_form)
     close = beside(curve, u, direction / length(weights * direction), weights, expected, settings.newton, leads)
@@ -435,15 +463,11 @@ def _away(
         )
     point = close.point
     adapted = curve.adapted(point.u, point.evaluation)
-    if adapted is not curve:
-        assert isinstance(adapted, MotionProblem)
-        u, direction = adapted.transfer(u, curve), adapted.transfer(point.u - u, curve)
-        weights = adapted.weights(u, 0.0)
-        direction = direction / length(weights * direction)
-        again = beside(adapted, u, direction, weights, expected, settings.newton, leads)
-        if again is not None and (again.smooth or not close.smooth):
-            close = again
-    if not close.smooth:
-        own = close.point.curve
-        notes.append(f"between {curve.where(u)} and {own.where(close.point.u)}: {UNSEEN}")
-    return close.point
+    if adapted is curve:
+        return close
+    assert isinstance(adapted, MotionProblem)
+    u, direction = adapted.transfer(u, curve), adapted.transfer(point.u - u, curve)
+    weights = adapted.weights(u, 0.0)
+    direction = direction / length(weights * direction)
+    again = beside(adapted, u, direction, weights, expected, settings.newton, leads)
+    return again if again is not None and (again.smooth or not close.smooth) else close

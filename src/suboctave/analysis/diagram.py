@@ -196,7 +196,11 @@ class _Growth:
             known = _shared(node)
             span = span_of(node.branch)
             for number, item in enumerate(switched):
-                if any(end.same_place(item, span, beside) for end, beside in known):
+                met = next((place for place in known if place[0].same_place(item, span, place[1])), None)
+                if met is not None:
+                    if item.multiplicity > 1:
+                        # a branch uses up one of those that fall together
+                        known.remove(met)
                     continue
                 full = full or count >= self.most
                 if full or interruption is not None or not self.followed(node, item):
@@ -215,12 +219,13 @@ class _Growth:
                     interruption = Interruption.of(cause)
                     continue
                 crossings = node.crossings + (item.kind == "BP")
-                met = node.branch.bifurcations["BP"]
-                child = DiagramBranch(branch, item, node.depth + 1, count, met=met, crossings=crossings)
+                points = node.branch.bifurcations["BP"]
+                child = DiagramBranch(branch, item, node.depth + 1, count, met=points, crossings=crossings)
                 count += 1
                 node.children.append(child)
                 waiting.append(child)
-                known += _shared(child)
+                own = item.multiplicity > 1
+                known += [place for place in _shared(child) if not (own and place[0].same_place(item, span, place[1]))]
                 interruption = branch.interruption
         left = sum(len(node.left) for node in root)
         if full or interruption is not None:

@@ -87,6 +87,9 @@ class Bifurcation:
     contact
         The contact that grazes: at a grazing its own; at another bifurcation the one whose beginning or end brings it
         about (it lies in the square-root layer behind that grazing, see `layer`); None for a smooth bifurcation.
+    multiplicity
+        How many bifurcations of the kind fall together here, as those of equal sectors do. Each is listed, with null
+        vectors of its own: those along which branches leave, as far as these are independent.
     tangent
         At a branch point: the direction (dX, d parameter) of the branch that it was found on; else None.
     arclength
@@ -104,6 +107,7 @@ class Bifurcation:
     uncertainty: float = 0.0
     arclength: float = 0.0
     contact: GrazingContact | None = None
+    multiplicity: int = 1
     tangent: tuple[float, ...] | None = field(default=None, repr=False)
     context: Any = field(default=None, repr=False)
 
@@ -132,10 +136,10 @@ class Bifurcation:
     def normal_form(self) -> NormalForm | None:
         """The coefficients of its normal form (`suboctave.bifurcation.normal_form`), computed when first asked for.
 
-        None for contacts and events, for a bifurcation that could only be bracketed, and for one in the layer behind a
-        grazing, where the equations are not smooth.
+        None for contacts and events, for a bifurcation that could only be bracketed, for one in the layer behind a
+        grazing, where the equations are not smooth, and for multiple ones, whose forms have more terms.
         """
-        if self.kind not in FORMS or self.null_vectors is None or self.contact is not None:
+        if self.kind not in FORMS or self.null_vectors is None or self.contact is not None or self.multiplicity > 1:
             return None
         try:
             return normal_form(self.kind, self.orbit.state(), self.null_vectors, self.parameter_name, self.kappa)
@@ -232,6 +236,8 @@ class Bifurcation:
     def remark(self) -> str:
         """What a table says beside the numbers: the contact that grazes, and what is not resolved."""
         words = []
+        if self.multiplicity > 1:
+            words.append(f"one of {self.multiplicity} that fall together")
         if self.uncertainty:
             words.append(f"{self.parameter_name} +- {self.uncertainty:.0e}")
         if self.contact is not None and self.kind in CONTACT_KINDS:

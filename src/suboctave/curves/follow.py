@@ -27,6 +27,7 @@ from suboctave.curves.events.monitors import (
     Located,
     changes,
     locate,
+    multiple,
     solved_by,
 )
 from suboctave.curves.guard import Crossing, GuardedStep, StepGuard
@@ -34,6 +35,7 @@ from suboctave.curves.identity import relation
 from suboctave.curves.junction import UNSEEN, Meeting, meeting
 from suboctave.curves.ledgers import REASON, CountCheck, DoublingWatch, HiddenDoublings, pair_in
 from suboctave.curves.motion import CRITICAL, MotionProblem
+from suboctave.curves.multiple import multiple_at
 from suboctave.curves.refine import bifurcation_at, solved_bifurcation, solved_in, turns_at
 from suboctave.curves.sample import Sample
 from suboctave.curves.trace import Settings, Trace, joined
@@ -43,6 +45,8 @@ from suboctave.interruption import Interruption
 
 #: amplitude, unit of length, up to which a motion is rest here: that of located branch points of rest is rounding
 _NOTHING = 1e-12
+#: cosine of two null vectors beyond which they are one
+_PARALLEL = 0.99
 
 
 class Driver(ABC):
@@ -105,11 +109,19 @@ def same_event(a: Bifurcation, b: Bifurcation) -> bool:
         return False
     if a.kind == "grazing" and len({item.contact and item.contact.element for item in (a, b)}) > 1:
         return False
+    if a.multiplicity > 1 and a.multiplicity == b.multiplicity and not _along_one(a, b):
+        return False
     same_place = all(np.isclose(a.parameter(name), b.parameter(name), rtol=1e-9) for name in a.free_names)
     if not (same_place and np.isclose(a.amplitude, b.amplitude, rtol=1e-6)):
         return False
     # the mirror image of a motion has its amplitude; at rest there is nothing to compare
     return max(a.amplitude, b.amplitude) <= _NOTHING or relation(a.orbit, b.orbit).one
+
+
+def _along_one(a: Bifurcation, b: Bifurcation) -> bool:
+    """Whether two bifurcations that fall together with others have one null vector."""
+    count = min(len(item.null_vectors.right) for item in (a, b))
+    return bool(abs(np.vdot(a.null_vectors.right[:count], b.null_vectors.right[:count])) > _PARALLEL)
 
 
 def _drop_seam(items: list[Bifurcation]) -> None:
@@ -239,9 +251,9 @@ class _Follower(Driver):
             return None
         if met.doubt:
             self.trace.warnings.append(f"{met.doubt}: {UNSEEN}")
-        return solved_bifurcation(
-            PERIOD_DOUBLING, met.solution, met.parent, self.settings.observe, self.trace.warnings, arclength
-        )
+        kind, settings = multiple(PERIOD_DOUBLING, met.multiplicity), self.settings
+        item = solved_bifurcation(kind, met.solution, met.parent, settings.observe, self.trace.warnings, arclength)
+        return replace(item, multiplicity=met.multiplicity)
 
     def _solved_again(self, sample: Sample, next_one: Sample) -> Sample:
         """A sample in the discretisation of the step that leaves it: where harmonics change, the motion moves a little
@@ -263,17 +275,17 @@ class _Follower(Driver):
         """The motion at a fraction of the way between two neighbours."""
         return self._sample(point_between(a.point, b.point, fraction, self.settings.newton, exactly))
 
-    def _crossing(self, a: Sample, b: Sample) -> Crossing | None:
-        """The branch point between two samples of different orientation, if its system can be solved."""
-        crossings = self._step.crossings if self._step is not None else []
-        known = next((crossing for crossing in crossings if crossing.between(a, b)), None)
-        if known is not None:
-            return known
-        located = self._located(BRANCH_POINT, a, b)
+    def _crossing(self, kind: BifurcationKind, a: Sample, b: Sample) -> Crossing | None:
+        """The branch point, or the multiple bifurcation of a kind, between two samples, if its system can be solved."""
+        listed = [] if self._step is None else [*self._step.crossings, *self._step.multiple]
+        for known in listed:
+            if known.located.kind is kind and known.between(a, b):
+                return known
+        located = self._located(kind, a, b)
         if located is None or located.solution is None:
             return None
         place = a.place + located.fraction * (b.place - a.place)
-        if not turns_at(located, a, b):
+        if kind.multiplicity > 1 or not turns_at(located, a, b):
             return Crossing(place, located, None)
         sign, log = self.settings.stability.along(located.solution.state).symmetric[:, 0].tolist()
         return Crossing(place, located, sign * math.exp(log))
@@ -312,6 +324,13 @@ class _Follower(Driver):
         if item is not None:
             self.trace.doubts += [(item.orbit, text) for text in sentences]
         return item
+
+    def _bifurcations(self, located: Located, a: Sample, b: Sample) -> list[Bifurcation]:
+        """What was located, the bifurcations that fall together one by one; none where it is not found again."""
+        if located.kind.multiplicity == 1:
+            item = self._bifurcation(located, a, b)
+            return [] if item is None else [item]
+        return multiple_at(located, a, b, self.settings.observe, self.trace.warnings)
 
     def _look_behind(self, inside: list[Sample]) -> None:
         """What the harmonics solved for do not show of a step: hidden pairs, and open verdicts between its points."""
@@ -402,21 +421,21 @@ class _Follower(Driver):
             if kind.name == "LP" and turned is not None:
                 self._turned = turned
                 continue
-            crossing = self._crossing(a, b) if kind is BRANCH_POINT else None
+            crossing = self._crossing(kind, a, b) if kind is BRANCH_POINT or kind.multiplicity > 1 else None
             if crossing is None:
                 located = self._located(kind, a, b)
             else:
                 located = replace(crossing.located, fraction=(crossing.place - a.place) / (b.place - a.place))
-            item = None if located is None else self._bifurcation(located, a, b)
-            if located is None or item is None:
+            items = [] if located is None else self._bifurcations(located, a, b)
+            if located is None or not items:
                 # several real multipliers may pass for a pair: the count tells
                 if located is not None or kind.name != "NS":
-                    missing.append(kind.name)
+                    missing += [kind.name] * kind.multiplicity
                 continue
-            events.append((located.fraction, item))
+            events += [(located.fraction, item) for item in items]
             if crossing is not None and crossing.turned is not None:
                 # at a pitchfork the bifurcating branch turns back exactly at the branch point
-                turned = item
+                (turned,) = items
         if "BP" in missing and "LP" in missing:
             # across a jump between branches the slope means nothing
             missing.remove("LP")
@@ -443,8 +462,8 @@ class _Follower(Driver):
 
     def _changes(self, a: Sample, b: Sample) -> list[BifurcationKind]:
         """The kinds to look for between two samples, as they are to be solved for."""
-        kinds = [self._kinds[kind.name] for kind in changes(a, b)]
-        return kinds if self._watch is None else [kind for kind in kinds if kind.name != "PD"]
+        kinds = [kind if kind.multiplicity > 1 else self._kinds[kind.name] for kind in changes(a, b)]
+        return kinds if self._watch is None else [kind for kind in kinds if kind.name != "PD" or kind.multiplicity > 1]
 
     def _insert(self, item: Bifurcation) -> bool:
         """Put a bifurcation into its place on the branch unless it is there already."""
@@ -457,7 +476,7 @@ class _Follower(Driver):
         """A bifurcation between two neighbours; a branch point only if its system was solved."""
         known = self._last_located
         if known is None or known[0] is not kind or known[1] is not a or known[2] is not b:
-            must_solve = kind is BRANCH_POINT
+            must_solve = kind is BRANCH_POINT or kind.multiplicity > 1
             begins = a.point.arclength == 0.0 and len(self.trace.points) <= 1
             located = locate(kind, a, b, self.settings.newton, 9 if must_solve else 34, begins)
             unsolved = must_solve and located is not None and located.solution is None

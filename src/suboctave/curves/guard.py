@@ -27,17 +27,20 @@ from suboctave.compiled import kernel
 from suboctave.continuation.linear import length
 from suboctave.continuation.point import CurvePoint
 from suboctave.continuation.problem import Array
-from suboctave.curves.events.monitors import BRANCH_POINT, NEIMARK_SACKER, Located, changes
+from suboctave.curves.events.monitors import BRANCH_POINT, NEIMARK_SACKER, BifurcationKind, Located, changes
 from suboctave.curves.interior import FINEST, Interior, Steps, unsettled
 from suboctave.curves.sample import Sample
 from suboctave.curves.trace import Audit
 from suboctave.floquet.held import of_those_moved
-from suboctave.floquet.symmetric import in_rings
+from suboctave.floquet.symmetric import distinct, in_rings
 
 #: multipliers of modulus above one half may move by this much per interval (relative to their modulus above one)
 MOVEMENT = 0.5
 #: intervals shorter than this are not cut for the multipliers' movement, nor for that at +1 beside a branch point
 _EXAMINED = 0.01
+#: intervals shorter than this are settled where no multiplier comes near the circle: none lies within so many times the
+#: way that the multipliers move
+_NEAR, _REACH = 1e-3, 10.0
 #: steps shorter than this are not halved to tell a branch point from a jump between curves
 _JUMP = 1e-5
 #: distance from a branch point, as a share of an interval, from which on one cuts it
@@ -48,7 +51,7 @@ _AGREE = 0.03
 
 @dataclass(frozen=True)
 class Crossing:
-    """A branch point of a curve and its arclength.
+    """A branch point of a curve, or several bifurcations that fall together, and its arclength.
 
     turned: fold at it, where the curve turns back in its parameter exactly there; else None. The double zero of fold
     lies as far from there as the harmonics left out make it.
@@ -67,17 +70,18 @@ class StepGuard(Steps):
     """Examines the steps along one curve.
 
     `solve` gives the sample at a fraction of the way between two neighbours, about as exactly as rounding allows where
-    that is asked for (may raise ConvergenceError); `branch_point` the one between two samples of different orientation.
+    that is asked for (may raise ConvergenceError); `crossing` the branch point, or the multiple bifurcation of a kind,
+    between two samples whose tests show one.
     """
 
     def __init__(
         self,
         solve: Callable[[Sample, Sample, float, bool], Sample],
-        branch_point: Callable[[Sample, Sample], Crossing | None],
+        crossing: Callable[[BifurcationKind, Sample, Sample], Crossing | None],
     ) -> None:
         super().__init__()
         self.solve = solve
-        self.branch_point = branch_point
+        self.crossing = crossing
         #: the branch point behind at which the curve has turned back, while tests still reach back to it
         self.turned: Crossing | None = None
         self.audit = Audit()
@@ -130,6 +134,8 @@ class GuardedStep(Interior):
         #: the branch points in it, and that within reach at which the curve has turned back
         self.crossings: list[Crossing] = []
         self.turned = guard.turned if guard.turned and guard.leading_to(old)[0].place < guard.turned.place else None
+        #: the multiple bifurcations in it
+        self.multiple: list[Crossing] = []
         pending = [(old, new)]
         if self.size > _JUMP:
             self._look_for_crossing(old, new)
@@ -146,11 +152,11 @@ class GuardedStep(Interior):
         A pair that crosses the circle is seen in the count of unstable multipliers: it wants an interval of its own.
         """
         first, *_, last = samples = self.inside
-        kept, since = [first], set[str]()
+        kept, since = [first], set[BifurcationKind]()
         for p, q in pairwise(samples) if len(samples) > 2 else ():
-            now = {kind.name for kind in changes(p, q)}
-            crowded = now & since or (now and since and "NS" in now | since)
-            if p is not kept[-1] and (crowded or {kind.name for kind in changes(kept[-1], q)} != now | since):
+            now = set(changes(p, q))
+            crowded = now & since or (now and since and NEIMARK_SACKER in now | since)
+            if p is not kept[-1] and (crowded or set(changes(kept[-1], q)) != now | since):
                 kept.append(p)
                 since = set()
             since |= now
@@ -158,7 +164,7 @@ class GuardedStep(Interior):
 
     def harmless(self, p: Sample, q: Sample, reason: str) -> bool:
         # no event, but too close to one to tell it from two; open verdicts are stated as such
-        return reason != _BESIDE and (bool(changes(p, q)) or (reason in _REASONS[1:] and _open(p, q)))
+        return reason not in (_BESIDE, _TOGETHER) and (bool(changes(p, q)) or (reason in _REASONS[1:] and _open(p, q)))
 
     def cut(self, p: Sample, q: Sample, share: float) -> list[tuple[Sample, Sample]]:
         """See `Interior.cut`: not right at a branch point."""
@@ -178,6 +184,8 @@ class GuardedStep(Interior):
         if self.refused:
             return None
         eventful = p.unstable != q.unstable or bool(changes(p, q))
+        if not all(self._confirmed(kind, p, q) for kind in changes(p, q) if kind.multiplicity > 1):
+            return 0.5, _TOGETHER
         if eventful and not _explained(p, q):
             return 0.5, (
                 f"the number of unstable multipliers changes from {p.unstable} to {q.unstable}, which "
@@ -188,6 +196,8 @@ class GuardedStep(Interior):
         if crossing is not None and self.measures(p)[0, 0] != self.measures(q)[0, 0]:
             return 0.5, _BESIDE
         doubt = super().doubt(p, q)
+        if doubt is not None and doubt[1] in _REASONS[1:] and h <= _NEAR and _out_of_reach(p, q):
+            return None
         if doubt is None and h > _EXAMINED and _movement(p.floquet.multipliers, q.floquet.multipliers) > MOVEMENT:
             return 0.5, "multipliers move too fast to be followed"
         # right beside a branch point at which the curve turns the multiplier at +1 is known up to its error only
@@ -209,23 +219,35 @@ class GuardedStep(Interior):
         """The branch point between two samples; the step is refused if the orientation changes without one, which it
         does not along one branch.
         """
-        if not BRANCH_POINT.changed(p, q):
+        if BRANCH_POINT not in changes(p, q):
             return None
         known = next((crossing for crossing in self.crossings if crossing.between(p, q)), None)
         if known is None:
-            known = self.steps.branch_point(p, q)
+            known = self.steps.crossing(BRANCH_POINT, p, q)
             if known is not None:
                 self.crossings.append(known)
                 self.turned = known if known.turned is not None else self.turned
         self.refused = self.refused or (known is None and self.size > _JUMP)
         return known
 
+    def _confirmed(self, kind: BifurcationKind, p: Sample, q: Sample) -> bool:
+        """Whether bifurcations that seem to fall together between two samples do."""
+        if any(known.located.kind is kind and known.between(p, q) for known in self.multiple):
+            return True
+        found = self.steps.crossing(kind, p, q)
+        self.multiple += [] if found is None else [found]
+        return found is not None
+
     def relative(self, stencil: Sequence[Sample], k: int) -> Iterator[Array]:
-        """See `Interior.relative`: with the functions of multipliers in rings, then of those that elements move."""
+        """See `Interior.relative`: with the functions of multipliers in rings, where some are alike of one for each, then
+        of those that elements move.
+        """
         known = [s.floquet.multipliers for s in stencil]
         if self.turned or k == 0 or len({len(mu) for mu in known}) > 1 or not np.isfinite(known).all():
             return
-        yield in_rings(np.array(known), k - 1)
+        apart = [distinct(mu) for mu in known]
+        if len({len(mu) for mu in apart}) == 1:
+            yield in_rings(np.array(apart), k - 1)
         yield of_those_moved(known, [s.grip for s in stencil], k - 1)
 
     def measures(self, sample: Sample) -> Array:
@@ -243,6 +265,7 @@ class GuardedStep(Interior):
         return tests
 
 
+_TOGETHER = "several multipliers may pass the unit circle together, or one after the other"
 _RETURNS = "a multiplier may pass +1 and come back"
 _BESIDE = "the branch turns back beside a branch point, too close to tell where"
 _REASONS = (
@@ -251,6 +274,14 @@ _REASONS = (
     "a multiplier may pass -1 and come back",
     "a pair of multipliers may leave the unit circle and come back",
 )
+
+
+def _out_of_reach(p: Sample, q: Sample) -> bool:
+    """Whether all multipliers lie so far from the unit circle, for how they move between two samples close together,
+    that none gets there: zeros of `torus` may be those of neutral saddles.
+    """
+    clearance = min(sample.floquet.clearance for sample in (p, q))
+    return _movement(p.floquet.multipliers, q.floquet.multipliers) * _REACH < clearance
 
 
 def _open(p: Sample, q: Sample) -> bool:
@@ -268,16 +299,16 @@ def _disagreement(a: CurvePoint, b: CurvePoint) -> float:
 
 def _explained(p: Sample, q: Sample) -> bool:
     """Whether the tests that change across an interval explain how the number of unstable multipliers changes."""
-    change, changed = abs(p.unstable - q.unstable), {kind.name for kind in changes(p, q)}
+    kinds = changes(p, q)
+    change, changed = abs(p.unstable - q.unstable), {kind.name for kind in kinds}
     # open verdicts leave the count open, but not where the product of all pairs tells of one as well
     pair = change > 1 and "NS" not in changed and p.measures[0, -1] != q.measures[0, -1]
     if (change == 0 and not changed) or (_open(p, q) and not pair):
         return True
-    if {"LP", "BP"} <= changed:
-        # at a pitchfork the bifurcating branch turns back and is its own mirror image beyond
-        return change <= 2 + ("PD" in changed) + 2 * ("NS" in changed)
-    single = len(changed & {"LP", "BP", "PD"})
-    return change <= single + 2 * ("NS" in changed) and (change - single) % 2 == 0
+    pairs = sum(kind.multiplicity for kind in kinds if kind.name == "NS")
+    single = sum(kind.multiplicity for kind in kinds) - pairs
+    # at a pitchfork the bifurcating branch turns back and is its own mirror image beyond
+    return change <= single + 2 * pairs and ({"LP", "BP"} <= changed or (change - single) % 2 == 0)
 
 
 @kernel()

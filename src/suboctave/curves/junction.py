@@ -11,6 +11,7 @@ be there if the motion repeated earlier by that factor.
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -25,10 +26,10 @@ from suboctave.continuation.march import Arrival
 from suboctave.continuation.newton import NewtonOptions, correct
 from suboctave.continuation.point import CurvePoint, between, make_point
 from suboctave.continuation.problem import Array
-from suboctave.curves.events.locate import Guess, Singular, locate_singular
+from suboctave.curves.events.locate import Guess, Singular, locate_multiple, locate_singular
 from suboctave.curves.events.monitors import position
 from suboctave.curves.identity import apart
-from suboctave.curves.motion import MotionProblem
+from suboctave.curves.motion import MotionEvaluation, MotionProblem
 from suboctave.errors import ConvergenceError
 from suboctave.floquet.monodromy import floquet_multipliers
 from suboctave.harmonic.basis import ComplexArray
@@ -89,6 +90,11 @@ _BESIDE = 0.02
 _CLOSE = 0.02
 #: share of its odd part with which a step leaves a motion right beside its parent, on whose doublings what follows lies
 _VANISHED = 0.01
+#: odd part, in units of the motion, below which a curve may lead to its parent; distance of a multiplier from +1 up to
+#: which a motion cannot be told from those of other branches that leave a multiple bifurcation
+_LITTLE, MERGED = 0.3, 1e-6
+#: how far from where it is foretold the end of such a curve may lie, as a share of the way there
+_FORETOLD = 0.2
 #: way in the scaled parameter that rounding may account for
 _STILL = 1e-10
 #: what a branch says where it could not look closer
@@ -143,13 +149,15 @@ def period_name(nu: int) -> str:
 class Meeting:
     """A branch that meets its parent: the parent's period doubling, its curve, how the march ends.
 
-    `doubt` says where between the last point and the parent something may happen unseen; empty if nowhere.
+    `doubt` says where between the last point and the parent something may happen unseen; empty if nowhere;
+    `multiplicity`: of the period doubling.
     """
 
     solution: Singular
     parent: MotionProblem
     arrival: Arrival
     doubt: str = ""
+    multiplicity: int = 1
 
 
 def meeting(a: CurvePoint, b: CurvePoint, newton: NewtonOptions) -> Meeting | None:
@@ -160,33 +168,53 @@ def meeting(a: CurvePoint, b: CurvePoint, newton: NewtonOptions) -> Meeting | No
     if basis.nu % 2:
         return None
     odd_a, odd_b = _odd(curve.transfer(a.u, a.curve), curve, b.weights), _odd(b.u, curve, b.weights)
+    first, last = length(odd_a), length(odd_b)
     turned = bool(odd_a @ odd_b < 0.0)
-    if not turned and length(odd_b) > _VANISHED * length(odd_a):
+    ahead = not turned and last > _VANISHED * first
+    if ahead and not (last < min(first, _LITTLE) and _merged(b)):
         return None
     parent = curve.with_basis(basis.halved)
-    share = length(odd_a) / (length(odd_a) + length(odd_b))
+    share = first / (first - last if ahead else first + last)
     u = between(a, b, share)
     x, omega, values = curve.split(u)
     half = basis.even_part(x)
     try:
         balance = parent.balance.settle(half, omega, values)
-        doubling = locate_singular(Guess(balance.at(half, omega, values), curve.name, curve.span), Kind.HALF)
+        doubling, several = _doubling(Guess(balance.at(half, omega, values), curve.name, curve.span))
     except ConvergenceError:
         return None
     state = doubling.state
     there = curve.transfer(parent.u_of(state), parent)
-    place = position(a, b, there)
-    beyond = 1e-6 if turned else 2.0 * _VANISHED
-    if place is None or not -1e-6 <= place <= 1.0 + beyond or doubling.vectors is None:
+    if ahead:
+        reached = length(b.weights * (there - u)) <= _FORETOLD * length(b.weights * (u - b.u))
+    else:
+        place = position(a, b, there)
+        reached = place is not None and -1e-6 <= place <= 1.0 + (1e-6 if turned else 2.0 * _VANISHED)
+    if not reached or doubling.vectors is None:
         return None
     reason = f"met the {period_name(basis.nu // 2)} motion at its period doubling at {curve.where(there)}"
-    last, doubt = _last_before(a, b, there, doubling, newton)
-    return Meeting(
-        doubling,
-        parent.with_balance(state.balance),
-        Arrival(last, Ending(EndReason.MET_BRANCH, curve.where(there), reason)),
-        doubt,
-    )
+    if several > 1:
+        before, doubt = None, f"between {a.curve.where(a.u)} and {curve.where(there)}"
+    else:
+        before, doubt = _last_before(a, b, there, doubling, newton)
+    arrival = Arrival(before, Ending(EndReason.MET_BRANCH, curve.where(there), reason))
+    return Meeting(doubling, parent.with_balance(state.balance), arrival, doubt, several)
+
+
+def _merged(point: CurvePoint) -> bool:
+    """Whether a motion cannot be told from those of other branches that lead to the same place."""
+    assert isinstance(point.evaluation, MotionEvaluation)
+    return bool(np.abs(point.evaluation.floquet.multipliers - 1.0).min() < MERGED)
+
+
+def _doubling(guess: Guess) -> tuple[Singular, int]:
+    """The period doubling beside a motion, and how many fall together in it."""
+    away = np.abs(floquet_multipliers(guess.state).multipliers + 1.0)
+    several = int(np.count_nonzero(away <= 1.1 * away.min() + MERGED))
+    if several > 1:
+        with suppress(ConvergenceError):
+            return locate_multiple(guess, Kind.HALF, several), several
+    return locate_singular(guess, Kind.HALF), 1
 
 
 def _odd(u: Array, curve: MotionProblem, weights: Array) -> Array:

@@ -137,7 +137,7 @@ def _open(result: FloquetResult) -> np.ndarray:
 def _others_open(item: Bifurcation) -> np.ndarray:
     """The same without those that make the bifurcation."""
     within = _open(item.floquet)
-    count = KINDS[item.kind].critical if item.kind in KINDS else 0
+    count = KINDS[item.kind].critical * item.multiplicity if item.kind in KINDS else 0
     if count:
         mu = item.multipliers
         critical = item.critical_multiplier()

@@ -28,10 +28,22 @@ from suboctave.harmonic.basis import Array, ComplexArray
 
 #: sum of the logarithms of all multipliers, `-int trace(M^-1 (C + f_v)) dt`, below which a motion counts as undamped
 UNDAMPED = 1e-9
+#: relative difference up to which multipliers are equal: of two that meet rounding leaves 1e-8
+_EQUAL = 1e-7
 #: squares of products beyond which a factor is one to rounding
 _LARGE = 1e280
 #: modulus of a multiplier, or of a product of two, up to which its ring would have to grow many times over to reach 1
 _INSIDE = 0.25
+
+
+def distinct(mu: ComplexArray) -> ComplexArray:
+    """Multipliers without those that equal another one: a symmetric system has families of equal ones all along a
+    branch, of which one stands for all. Where two such families are each other's inverses torus has a multiple zero.
+    """
+    if len(mu) < 2:
+        return mu
+    alike = np.abs(mu[:, None] - mu[None, :]) <= _EQUAL * np.abs(mu)[:, None]
+    return mu[~np.tril(alike, -1).any(axis=1)]
 
 
 def symmetric_functions(mu: ComplexArray) -> Array:

@@ -15,6 +15,7 @@ from suboctave.continuation.newton import NewtonOptions, correct
 from suboctave.continuation.point import CurvePoint
 from suboctave.curves.augmentation import PLAIN, Augmentation
 from suboctave.curves.kinds.branch_point import BranchPointEquations, BranchPointUnfolded
+from suboctave.curves.kinds.multiple import MultipleEquations, MultiplePoint
 from suboctave.curves.kinds.singular import SingularEquations, SingularOperator
 from suboctave.curves.motion import MotionEvaluation, MotionProblem
 from suboctave.errors import ConvergenceError
@@ -23,6 +24,7 @@ from suboctave.floquet.result import FloquetResult
 from suboctave.harmonic.basis import Array
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.perturbation import Kind
+from suboctave.harmonic.truncation import motion_size
 from suboctave.lazy import lazy
 
 #: corrections of half a motion or half a range at most, the last one of 1e-9 of them
@@ -30,6 +32,8 @@ NEWTON = NewtonOptions(tolerance=1e-10, correction=1e-9, iterations=12, longest=
 #: unfolding, in units of the forces that balance, above which a located point is no branch point: a hundred times what
 #: rounding makes of a branch point that a symmetry forces. One of beta parts the branches of a pitchfork by beta^(1/3)
 _UNFOLDING = 1e-13
+#: way along a branch, in scaled arclength, within which simple bifurcations count as a multiple one
+_APART = 1e-7
 #: corrections, at most, made after convergence
 _POLISHED = 3
 _TINY = float(np.finfo(float).tiny)
@@ -157,6 +161,28 @@ def locate_singular(guess: Guess, kind: Kind, operator: type[SingularOperator] =
     equations = evaluation.equations
     assert isinstance(equations, SingularEquations)
     return Singular(evaluation.state, equations.bordered.vectors, equations.kappa, evaluation.error, iterations)
+
+
+def locate_multiple(guess: Guess, kind: Kind, multiplicity: int) -> Singular:
+    """Locate a motion at which J_kappa loses so much rank at once; with one pair of its null vectors.
+
+    ConvergenceError where Newton's method fails, or where those are simple bifurcations that lie beside each other.
+    """
+    own = MultiplePoint.of(guess.state, kind, multiplicity, guess.name, guess.kappa)
+    start = np.array([guess.kappa]) if kind is Kind.FREE else np.zeros(own.extras)
+    evaluation, iterations = solve(guess, own, start)
+    equations = evaluation.equations
+    assert isinstance(equations, MultipleEquations)
+    weights = np.append(evaluation.state.balance.column_weights, 1.0 / guess.span)
+    weights[:-1] /= max(motion_size(evaluation.state), guess.size) or 1.0
+    apart = equations.apart(weights)
+    if apart > _APART or own.unfolding(equations.extra) > _UNFOLDING:
+        raise ConvergenceError(
+            f"no multiple {own.name}: {multiplicity} simple ones lie {apart:.1e} of arclength apart, unfolded by "
+            f"{own.unfolding(equations.extra):.1e}"
+        )
+    vectors = equations.vectors(np.eye(multiplicity)[0])
+    return Singular(evaluation.state, vectors, equations.kappa, evaluation.error, iterations)
 
 
 def locate_branch_point(guess: Guess) -> Singular:

@@ -7,7 +7,8 @@ neighbours, where in between, how to solve for it, and whether a solution is one
 - BP: the bordered determinant `det [R_X R_omega; t]` changes sign, the branch going straight on;
 - PD: det J_half changes sign;
 - NS: the number of multipliers outside the unit circle changes by pairs that no LP, BP or PD accounts for. Two real
-  multipliers with product one (a neutral saddle) never cross the circle and are not counted.
+  multipliers with product one (a neutral saddle) never cross the circle and are not counted;
+- multiple BP, PD and NS: several multipliers pass one place on the circle, alike before and behind it.
 
 First the bordered system is solved from an interpolated start; where that does not converge into the step, the step is
 bisected on the test function and the solver tries again from a nearer point. If it never converges (at a grazing
@@ -21,6 +22,7 @@ import cmath
 import weakref
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import product
 
 import numpy as np
@@ -32,15 +34,20 @@ from suboctave.continuation.newton import NewtonOptions
 from suboctave.continuation.point import CurvePoint, between, point_between
 from suboctave.continuation.problem import Array
 from suboctave.curves.events.formulation import BORDERED, Formulation
-from suboctave.curves.events.locate import Guess, Singular, locate_branch_point
+from suboctave.curves.events.locate import Guess, Singular, locate_branch_point, locate_multiple
 from suboctave.curves.sample import Sample
 from suboctave.errors import ConvergenceError
 from suboctave.floquet.symmetric import UNDAMPED
+from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.perturbation import Kind
 
 #: transversality of a limit point, at least. Newton's method leaves one located on a branch point by mistake within
 #: 1e-9 of it, where it is as much; at a peak it is the damping ratio
 _TRANSVERSAL = 1e-7
+#: how far apart multipliers that pass the circle together may lie, as a share of their distance from it: where they are
+#: looked for in one, which the equations then have to confirm
+_ALIKE = 1e-3
+_NONE = np.zeros(0)
 
 
 class BifurcationKind(ABC):
@@ -51,6 +58,8 @@ class BifurcationKind(ABC):
     formulation: Formulation = BORDERED
     #: whether multipliers tell, those of the completed motion, and what is solved for belongs to the truncated one
     counted: bool = False
+    #: how many bifurcations of the kind fall together
+    multiplicity: int = 1
 
     def __init__(self, formulation: Formulation = BORDERED) -> None:
         self.formulation = formulation
@@ -66,6 +75,11 @@ class BifurcationKind(ABC):
     def kappa(self, sample: Sample) -> float:
         """Start for the frequency of the perturbation."""
         return 0.0
+
+    @staticmethod
+    def of_its_sort(sample: Sample) -> ComplexArray:
+        """The multipliers that could pass the circle where those of the kind do; none unless several may together."""
+        return np.zeros(0, dtype=complex)
 
     def solve(self, guess: Guess) -> Singular:
         """Solve the bifurcation's system from a guess."""
@@ -114,6 +128,11 @@ class BranchPoint(BifurcationKind):
     def fraction(self, a: Sample, b: Sample) -> float:
         return _zero(_nearest(a, 1.0), _nearest(b, 1.0))
 
+    @staticmethod
+    def of_its_sort(sample: Sample) -> ComplexArray:
+        mu = _real(sample)
+        return mu[mu.real > 0.0]
+
     def solve(self, guess: Guess) -> Singular:
         return locate_branch_point(guess)
 
@@ -129,6 +148,11 @@ class PeriodDoubling(BifurcationKind):
 
     def fraction(self, a: Sample, b: Sample) -> float:
         return _zero(_nearest(a, -1.0), _nearest(b, -1.0))
+
+    @staticmethod
+    def of_its_sort(sample: Sample) -> ComplexArray:
+        mu = _real(sample)
+        return mu[mu.real < 0.0]
 
 
 class NeimarkSacker(BifurcationKind):
@@ -162,6 +186,10 @@ class NeimarkSacker(BifurcationKind):
             return None
         return (complex(out), complex(partner)) if outside is a else (complex(partner), complex(out))
 
+    @staticmethod
+    def of_its_sort(sample: Sample) -> ComplexArray:
+        return np.array(_pairs(sample), dtype=complex)
+
     def fraction(self, a: Sample, b: Sample) -> float:
         pair = self._pair(a, b)
         return 0.5 if pair is None else _zero(abs(pair[0]) - 1.0, abs(pair[1]) - 1.0)
@@ -184,6 +212,40 @@ class NeimarkSacker(BifurcationKind):
         return cmath.exp(2j * cmath.pi * solution.kappa / solution.state.rate)
 
 
+class Multiple(BifurcationKind):
+    """Several of a kind fall together, as the modes of equal sectors do."""
+
+    def __init__(self, kind: BifurcationKind, multiplicity: int) -> None:
+        super().__init__(kind.formulation)
+        self.kind, self.multiplicity = kind, multiplicity
+        self.name, self.operator, self.counted = kind.name, kind.operator, kind.counted
+
+    def changed(self, a: Sample, b: Sample) -> bool:
+        return any(isinstance(kind, Multiple) and kind.name == self.name for kind in changes(a, b))
+
+    def fraction(self, a: Sample, b: Sample) -> float:
+        before, behind = _together(self.kind, a, b)
+        return _zero(float(before.mean()), float(behind.mean())) if before.size else 0.5
+
+    def kappa(self, sample: Sample) -> float:
+        return self.kind.kappa(sample)
+
+    def solve(self, guess: Guess) -> Singular:
+        return locate_multiple(guess, self.operator, self.multiplicity)
+
+    def genuine(self, solution: Singular, guess: Guess) -> bool:
+        return self.operator is not Kind.FREE or self.kind.genuine(solution, guess)
+
+    def critical(self, solution: Singular) -> complex | None:
+        return self.kind.critical(solution)
+
+
+@lru_cache(maxsize=64)
+def multiple(kind: BifurcationKind, multiplicity: int) -> BifurcationKind:
+    """The kind of so many of a kind that fall together, one object for each; of one itself."""
+    return Multiple(kind, multiplicity) if multiplicity > 1 else kind
+
+
 BRANCH_POINT, LIMIT_POINT, PERIOD_DOUBLING = BranchPoint(), LimitPoint(), PeriodDoubling()
 NEIMARK_SACKER = NeimarkSacker()
 #: in the order in which they are looked for: a BP explains the LP test's change at a pitchfork
@@ -203,13 +265,45 @@ def changes(a: Sample, b: Sample) -> tuple[BifurcationKind, ...]:
     # several ask this of the same two
     if b.compared is not None and b.compared[0]() is a:
         return b.compared[1]
-    kinds: list[BifurcationKind] = [kind for kind in ALL_KINDS[:3] if kind.changed(a, b)]
+    kinds: list[BifurcationKind] = []
+    for kind in ALL_KINDS[:3]:
+        several = len(_together(kind, a, b)[0])
+        if several or kind.changed(a, b):
+            kinds.append(multiple(kind, several))
     # one multiplier passes +1 at a limit point or a branch point, or at both in one
-    accounted = len(kinds) - (len(kinds) > 1 and kinds[1] is LIMIT_POINT)
+    accounted = sum(kind.multiplicity for kind in kinds)
+    accounted -= len(kinds) > 1 and kinds[0] is BRANCH_POINT and kinds[1] is LIMIT_POINT
     if NEIMARK_SACKER.beyond(a, b, accounted):
-        kinds.append(NEIMARK_SACKER)
+        several = len(_together(NEIMARK_SACKER, a, b)[0])
+        kinds.append(multiple(NEIMARK_SACKER, several))
     b.compared = weakref.ref(a), tuple(kinds)
     return b.compared[1]
+
+
+def _together(kind: BifurcationKind, a: Sample, b: Sample) -> tuple[Array, Array]:
+    """By how much the multipliers that pass the circle together between two neighbours, two of them at least, lie
+    outside of it at both; they must be alike before and behind. Empty where there are none.
+    """
+    sorts = [kind.of_its_sort(sample) for sample in (a, b)]
+    outside = [mu[np.abs(mu) > 1.0] for mu in sorts]
+    several = abs(len(outside[0]) - len(outside[1]))
+    if several < 2:
+        return _NONE, _NONE
+    inwards = len(outside[0]) > len(outside[1])
+    first, last = (outside[0], sorts[1]) if inwards else (sorts[0], outside[1])
+    families = _alike(first if inwards else first[np.abs(first) <= 1.0], several)
+    others = _alike(last[np.abs(last) <= 1.0] if inwards else last, several)
+    if not (families and others):
+        return _NONE, _NONE
+    pair = min(product(families, others), key=lambda pair: abs(pair[0].mean() - pair[1].mean()))
+    return np.abs(pair[0]) - 1.0, np.abs(pair[1]) - 1.0
+
+
+def _alike(mu: ComplexArray, several: int) -> list[ComplexArray]:
+    """The sets of so many of some multipliers that lie as good as in one place."""
+    mu = mu[np.argsort(np.abs(mu), kind="stable")]
+    sets = [mu[i : i + several] for i in range(len(mu) - several + 1)]
+    return [one for one in sets if np.abs(one - one.mean()).max() <= _ALIKE * np.abs(np.abs(one) - 1.0).max()]
 
 
 def _zero(a: float, b: float) -> float:
@@ -224,10 +318,15 @@ def _pairs(sample: Sample) -> list[complex]:
     return [mu for mu in sample.floquet.multipliers if mu.imag > 1e-9 * abs(mu)]
 
 
+def _real(sample: Sample) -> ComplexArray:
+    """The real multipliers."""
+    mu = sample.floquet.multipliers
+    return mu[np.abs(mu.imag) < 1e-7 * np.abs(mu)]
+
+
 def _nearest(sample: Sample, target: float) -> float:
     """Distance of the real multiplier nearest to a target from it, signed; nan if there is none."""
-    mu = sample.floquet.multipliers
-    real = mu[np.abs(mu.imag) < 1e-7 * np.abs(mu)].real
+    real = _real(sample).real
     return float(real[np.argmin(np.abs(real - target))] - target) if real.size else float("nan")
 
 
