@@ -31,6 +31,7 @@ import numpy as np
 from suboctave.bifurcation.bordered import NullVectors, bordered, null_vectors, transversality
 from suboctave.continuation.linear import length
 from suboctave.continuation.point import crossing_matrix
+from suboctave.curves.kinds.free_phase import FreePhaseOperator
 from suboctave.curves.kinds.nonlinear_mode import NonlinearMode
 from suboctave.curves.kinds.ridge import Ridge, RidgeEquations
 from suboctave.curves.kinds.singular import SingularOperator
@@ -512,6 +513,8 @@ _OF_CYCLES: dict[Kind, tuple[CurveTest, ...]] = {
         PairCrossing("NSNS"),
     ),
 }
+#: of conservative modes two multipliers are -1 all along, and no pair leaves the unit circle alone
+_OF_MODES: tuple[CurveTest, ...] = (FoldOfCycles("LPPD"),)
 
 
 def tests_of(curve: MotionProblem) -> tuple[CurveTest, ...]:
@@ -520,8 +523,8 @@ def tests_of(curve: MotionProblem) -> tuple[CurveTest, ...]:
     if own.free_phase:
         if curve.augmentation is not own:
             return turns
-        if isinstance(own, SingularOperator):
-            return turns + _OF_CYCLES[own.kind]
+        if isinstance(own, FreePhaseOperator):
+            return turns + (_OF_MODES if own.conservative else _OF_CYCLES[own.kind])
         if isinstance(own, NonlinearMode):
             # the determinant of J_half costs less than multipliers, which nothing else asks for at every point
             return (
