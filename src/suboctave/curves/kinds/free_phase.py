@@ -14,12 +14,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from suboctave.bifurcation.bifurcation import Bifurcation
+from suboctave.bifurcation.bordered import null_vectors
 from suboctave.curves.kinds.limit_cycle import LimitCycle
 from suboctave.curves.kinds.nonlinear_mode import ModeEquations, NonlinearMode, of_modes
 from suboctave.curves.kinds.singular import SingularEquations, SingularOperator
 from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.evaluation import BalanceState
-from suboctave.harmonic.perturbation import rate_by_feeding
+from suboctave.harmonic.perturbation import Kind, rate_by_feeding
 from suboctave.lazy import lazy
 
 
@@ -36,6 +37,10 @@ class FreePhaseOperator(SingularOperator):
         family, more = (NonlinearMode if of_modes(item) else LimitCycle).through(item, state, names)
         own, extra = SingularOperator.through(item, state, names)
         return cls(own.kind, own.borders, own.unit, family), np.append(extra, more)
+
+    def of_kind(self, state: BalanceState, kind: Kind) -> FreePhaseOperator:
+        """Another operator of the same family, with the null vectors at a motion."""
+        return FreePhaseOperator(kind, null_vectors(state, kind), state.omega**2, self.family)
 
     @property
     def conservative(self) -> bool:

@@ -409,8 +409,10 @@ class PairCrossing(CurveTest):
             kappa -= change.real
             if abs(kappa - start) > _STRAYED * rate:
                 return growth
-        exponent = float(change.imag) * 2.0 * np.pi / rate
+        exponent, critical = float(change.imag) * 2.0 * np.pi / rate, sample.evaluation.critical
         # other multipliers, the critical one among them, have zeros of g as well
+        if critical is not None and abs(kappa - abs(np.angle(critical)) * rate / (2.0 * np.pi)) <= abs(kappa - start):
+            return growth
         return exponent if abs(exponent - growth) <= _AGREES * max(abs(growth), _STRAYED) else growth
 
     def confirmed(self, sample: Sample) -> bool:
