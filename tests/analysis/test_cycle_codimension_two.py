@@ -98,7 +98,7 @@ def test_a_one_to_two_resonance():
 
 
 def test_flip_neimark_sacker_points():
-    """y doubles where x is as large as c says, z vibrates where m does: each stays in its place on the other's curve."""
+    """y doubles where x is as large as c says, z vibrates where m does: each stays in place on the other's curve."""
     second = "y'' + c*y' + (0.25 + 0.1*x)*y + y**3 = 0"
     third = "z'' + (0.8*x**2 + z**2 - m)*z' + 2.6*z = 0"
     found = cycles(second, third, bounds=(-0.0195, 0.001), c=0.05, m=0.14)

@@ -120,6 +120,10 @@ def test_a_condensed_structure(name, bounds):
         there = of_chain(chain(**{name: curves[0].parameter(name)[i]}))
         assert one.omega == pytest.approx(there.omega, rel=1e-8)
         assert curves[0].amplitude[i] == pytest.approx(there.amplitude, rel=1e-8)
+    ways = curves[0].parameter(name) - chain().parameters[name]
+    slopes = np.gradient(curves[0].omega, curves[0].parameter(name))
+    slope = np.interp(0.0, *(v[np.argsort(ways)] for v in (ways, slopes)))
+    assert so.sensitivity(of_chain(chain()), name)[name]["omega"] == pytest.approx(slope, rel=1e-2)
 
 
 def test_its_extremum_in_a_third_parameter(tongue):
