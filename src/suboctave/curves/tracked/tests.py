@@ -10,7 +10,8 @@
                       curves, as of NS points along a branch: a complex pair passes it
     NSNS              the same on NS curves
     LP, BP, PD, NS    the same on curves of motions that need no critical multiplier (`MOTION_KINDS`)
-    LPPD, LPNS        of limit cycles, where J_0 is singular all along: det [R_X R_omega; phase condition]
+    LPPD, LPNS        of limit cycles, where J_0 is singular all along: det [R_X R_omega; phase condition]; LPPD of
+                      conservative modes: the same bordered by R_zeta and the derivatives of the action
     LP, BP            of motions of a free phase, where J_0 is singular all along: the last parameter turns, of
                       conservative modes the action; the orientation of the curve changes
 
