@@ -14,12 +14,12 @@ pytestmark = pytest.mark.filterwarnings("ignore::suboctave.NegativeDampingWarnin
 RUBBING = "x'' + x - mu*x' - 0.1*x'**3 + 0.1*x'**5 = 0"
 
 
-def cycles(second, **parameters):
-    """Of the rubbing mass with a second one, which does not act on it and rests."""
-    system = so.System.from_equations([RUBBING, second], {"mu": 0.0, **parameters})
+def cycles(*others, bounds=(-0.03, 0.01), **parameters):
+    """Of the rubbing mass with others, which do not act on it and rest."""
+    system = so.System.from_equations([RUBBING, *others], {"mu": 0.0, **parameters})
     hopf = so.equilibria(system, "mu", (-0.1, 0.1)).bifurcations["Hopf"]
     first = min(hopf, key=lambda item: abs(item.parameters["mu"]))
-    return so.limit_cycles(first, (-0.03, 0.01), harmonics=5)
+    return so.limit_cycles(first, bounds, harmonics=5)
 
 
 @pytest.fixture(scope="module")
@@ -71,6 +71,63 @@ def test_a_fold_flip():
     mu = multipliers(event)
     assert np.sort(np.abs(mu - 1.0))[1] < 1e-4
     assert np.abs(mu + 1.0).min() < 1e-5
+
+
+def test_a_one_to_two_resonance():
+    """x shakes the stiffness of y at about twice its frequency: the product of the two multipliers of y is one, and
+    both are -1, where its mean damping is zero at the edge of that tongue.
+    """
+    found = cycles("y'' + (0.2*x**2 - m)*y' + (0.27 + 0.1*x)*y + y**3 = 0", bounds=(-0.013, 0.001), m=0.01)
+    doublings = so.track(found.bifurcations["PD"][0], "m", (0.005, 0.03))
+    tori = so.track(found.bifurcations["NS"][0], "m", (0.005, 0.03))
+    assert "the curve ends in a 1:2 resonance at" in tori.ended
+    (on_doublings,), (at_the_end,) = (curve.bifurcations["R2"] for curve in (doublings, tori))
+    for name in ("m", "mu"):
+        assert on_doublings.parameters[name] == pytest.approx(at_the_end.parameters[name], rel=1e-8)
+    assert tori.parameter("m")[-1] == at_the_end.parameters["m"]
+    # to first order the tongue begins where 0.1 A / 4 is the distance of the squares of the frequencies, 0.02, over 2
+    assert abs(at_the_end.orbit.harmonic(1, 0)) == pytest.approx(0.4, rel=0.02)
+    for event in (on_doublings, at_the_end):
+        x = event.orbit.displacement(np.linspace(0.0, event.orbit.period, 64, endpoint=False))[0]
+        assert 0.2 * np.mean(x**2) == pytest.approx(event.parameters["m"], rel=1e-6)
+        mu = multipliers(event)
+        pair = mu[np.argsort(np.abs(mu + 1.0))[:2]]
+        assert [pair.sum(), pair.prod()] == pytest.approx([-2.0, 1.0], abs=1e-6)
+        with pytest.raises(so.InputError, match="this R2 is one of limit cycles"):
+            so.track(event, "m", (0.005, 0.03))
+
+
+def test_flip_neimark_sacker_points():
+    """y doubles where x is as large as c says, z vibrates where m does: each stays in place on the other's curve."""
+    second = "y'' + c*y' + (0.25 + 0.1*x)*y + y**3 = 0"
+    third = "z'' + (0.8*x**2 + z**2 - m)*z' + 2.6*z = 0"
+    found = cycles(second, third, bounds=(-0.0195, 0.001), c=0.05, m=0.14)
+    doubling, torus = (found.bifurcations[kind][0] for kind in ("PD", "NS"))
+    for start, other, name, bounds in ((doubling, torus, "c", (0.045, 0.065)), (torus, doubling, "m", (0.08, 0.16))):
+        (event,) = so.track(start, name, bounds).bifurcations["PDNS"]
+        assert event.parameters["mu"] == pytest.approx(other.parameters["mu"], rel=1e-8)
+        mu = multipliers(event)
+        assert np.abs(mu + 1.0).min() < 1e-6
+        assert np.abs(np.abs(mu[mu.imag > 0.1]) - 1.0) == pytest.approx([0.0], abs=1e-6)
+
+
+@pytest.mark.parametrize("square", [5.0, 5.7], ids=["apart", "close"])
+def test_double_neimark_sacker_points(square):
+    """y and z have the same damping, m = k, also where their multipliers lie close to each other on the circle."""
+    second = f"y'' + (0.8*x**2 + y**2 - k)*y' + {square}*y = 0"
+    third = "z'' + (0.8*x**2 + z**2 - m)*z' + 2.6*z = 0"
+    found = cycles(second, third, bounds=(-0.0195, 0.001), k=0.1, m=0.14)
+    first, last = sorted(found.bifurcations["NS"], key=lambda item: item.parameters["mu"])
+    for torus in (first, last):
+        (event,) = so.track(torus, "m", (0.09, 0.15)).bifurcations["NSNS"]
+        assert event.parameters["m"] == pytest.approx(0.1, rel=1e-8)
+        assert event.parameters["mu"] == pytest.approx(last.parameters["mu"], rel=1e-8)
+        mu = multipliers(event)
+        pairs = mu[mu.imag > 0.1]
+        assert np.abs(pairs) == pytest.approx(np.ones(2), abs=1e-6)
+        # sqrt(2.6) and sqrt(square) turns in a period, but for the square of the damping
+        turns = np.sort(np.abs(np.angle(np.exp(2j * np.pi * np.sqrt([2.6, square])))))
+        assert np.sort(np.angle(pairs)) == pytest.approx(turns, abs=5e-3)
 
 
 # ------------------------------------------------------------------------------------------------------- normal forms

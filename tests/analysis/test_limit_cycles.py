@@ -7,7 +7,8 @@ import pytest
 
 import suboctave as so
 from suboctave.continuation.problem import Array
-from suboctave.curves.kinds.limit_cycle import CycleWith, LimitCycle
+from suboctave.curves.kinds.free_phase import FreePhaseOperator
+from suboctave.curves.kinds.limit_cycle import LimitCycle
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.tracked.start import curve_through
 from suboctave.timedomain import shoot_cycle
@@ -68,7 +69,7 @@ def test_the_equations_by_differences():
     ]
     for item, names in zip(items, (("omega", "mu"), ("omega", "mu", "m"), ("omega", "mu", "m")), strict=True):
         curve, u = curve_through(item, basis, names, {"mu": (0.0, 1.0), "m": (0.0, 1.0)})
-        assert isinstance(curve.augmentation, LimitCycle if item.kind == "limit_cycle" else CycleWith)
+        assert isinstance(curve.augmentation, LimitCycle if item.kind == "limit_cycle" else FreePhaseOperator)
         u = u + 1e-2 * rng.normal(size=len(u))
         np.testing.assert_allclose(curve.evaluate(u).jacobian, differences(curve, u), atol=2e-6)
 

@@ -8,6 +8,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 import suboctave as so
+from suboctave.curves.kinds.free_phase import FreePhaseOperator
 from suboctave.curves.kinds.mode_event import ModeEvent
 from suboctave.curves.tracked.start import curve_through
 from suboctave.results.modes import ModeCurve
@@ -50,9 +51,13 @@ def test_the_equations_by_differences(mode, tongue):
     rng = np.random.default_rng(3)
     turn = so.nonlinear_mode(softening(damping=0.02), amplitude=(0.1, 2.5)).bifurcations["extremum"][0]
     crossing, limit = mode.bifurcations["BP"][0], tongue.bifurcations["LP"][0]
-    for item, name in ((crossing, "k"), (limit, "k"), (turn, "a"), (turn, "m")):
+    shaken = ["m*x'' + x + 2*x*y + 0.3*x**3 = 0", "y'' + c*y + x**2 + 0.5*y**3 = 0"]
+    system = so.System.from_equations(shaken, {"c": 4.2, "m": 1.0})
+    doubling = so.nonlinear_mode(system, 2, amplitude=0.1, observe=1).bifurcations["PD"][0]
+    cases = ((crossing, "k"), (limit, "k"), (turn, "a"), (turn, "m"), (doubling, "c"), (doubling, "m"))
+    for item, name in cases:
         curve, u = curve_through(item, so.HarmonicBasis(5), ("omega", name))
-        assert isinstance(curve.augmentation, ModeEvent)
+        assert isinstance(curve.augmentation, ModeEvent | FreePhaseOperator)
         u = u + 1e-3 * rng.normal(size=len(u))
         columns = []
         for i in range(len(u)):
@@ -174,8 +179,7 @@ bounds = [0.8, 1.2]
     np.testing.assert_array_equal(curve.omega, again.omega)
 
 
-def test_what_is_refused():
-    system = so.System.from_equations(["x'' + x + 2*x*y = 0", "y'' + c*y + x**2 = 0"], {"c": 4.2})
-    doubling = so.nonlinear_mode(system, 2, amplitude=0.1, observe=1).bifurcations["PD"][0]
-    with pytest.raises(so.InputError, match="LP, BP and extrema of omega are followed"):
-        so.track(doubling, "c", (4.1, 4.3))
+def test_what_is_refused(crossings):
+    (last,) = (e for e in crossings.extrema if e.parameter_name == "k")
+    with pytest.raises(so.InputError, match="lies on a curve of events of nonlinear modes"):
+        so.sensitivity(last)

@@ -35,7 +35,7 @@ from suboctave.continuation.newton import correct
 from suboctave.continuation.point import point_ahead
 from suboctave.curves.events.formulation import BorderedSystem
 from suboctave.curves.junction import repeats_earlier
-from suboctave.curves.kinds.nonlinear_mode import NonlinearMode
+from suboctave.curves.kinds.nonlinear_mode import NonlinearMode, of_modes
 from suboctave.curves.kinds.singular import SingularOperator
 from suboctave.curves.motion import MotionEvaluation, MotionProblem
 from suboctave.curves.starts import check_unknowns, harmonics_of, rule_of
@@ -90,7 +90,7 @@ def track(
     ----------
     bifurcation
         A located LP, BP, PD, NS or grazing of any branch (of motions of one or several load periods); a Hopf point of
-        equilibria; an LP, PD or NS of limit cycles; an LP, BP or extremum of omega of a nonlinear mode; one of the
+        equilibria; an LP, PD or NS of limit cycles; an LP, BP, PD or extremum of omega of a nonlinear mode; one of the
         `extrema` of a tracked curve; or one of its points of codimension two through which another curve passes, or
         from which one begins (GPD, R1, R2, LPPD, LPNS, PDNS, NSNS). With `onto` a kind of motions also a user's event
         or a point of a branch, one of its `points`, beside the curve.
@@ -340,11 +340,6 @@ def begun(start: Any, onto: Any, observe: int | str | None) -> tuple[Any, str | 
     """What a curve begins at, and the kind that is chosen of those through it: a motion as a point of its own curve."""
     kind = motion_kind(onto)
     if kind is None:
-        if isinstance(start, TrackedEvent) and on_mode(start) and start.kind == "PD":
-            raise InputError(
-                "this PD lies on a nonlinear mode, of which LP, BP and extrema of omega are followed in a second "
-                "parameter: switch_branch follows the motions of twice the period"
-            )
         return start, onto
     if not isinstance(start, Bifurcation | BranchPoint):
         raise InputError(
@@ -370,10 +365,11 @@ def curve_onto(item: Bifurcation, onto: str | None) -> str:
                 f"this is a {item.kind}: leave it out"
             )
         return item.kind
-    if len(item.names) > 2 and not item.turning:
+    family = "nonlinear modes" if of_modes(item) else "limit cycles" if len(item.names) > 2 else ""
+    if family and not item.turning:
         raise InputError(
-            f"this {item.kind} is one of limit cycles: no curve is entered from it; track begins at the other "
-            "bifurcation where it is located along cycles"
+            f"this {item.kind} is one of {family}: no curve is entered from it; track begins at the other "
+            "bifurcation where it is located along them"
         )
     if item.turning:
         raise InputError(

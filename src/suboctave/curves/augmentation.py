@@ -77,8 +77,6 @@ class Augmentation(ABC):
     relative: bool = False
     #: whether the equations read the observed degree of freedom, which is an unknown then
     reads_observed: bool = False
-    #: how many multipliers are critical at a solution; where two real ones are, rounding leaves their mean alone
-    trivial: int = 1
 
     @property
     @abstractmethod
@@ -94,6 +92,11 @@ class Augmentation(ABC):
     def free_phase(self) -> bool:
         """Whether a motion shifted in time is another solution: no load sets its phase, and omega is unknown."""
         return False
+
+    @property
+    def trivial(self) -> int:
+        """How many multipliers are critical at a solution; of two real ones rounding leaves the mean alone."""
+        return 1
 
     @property
     def no_multipliers(self) -> str:

@@ -21,6 +21,7 @@ from suboctave.continuation.linear import Factor, LeadingBlock, length
 from suboctave.continuation.point import CurvePoint
 from suboctave.curves.kinds.branch_point import BranchPointEquations
 from suboctave.curves.kinds.extremum import ExtremalEquations
+from suboctave.curves.kinds.free_phase import FreePhaseEquations, FreePhaseOperator
 from suboctave.curves.kinds.grazing import GrazingEquations
 from suboctave.curves.kinds.nonlinear_mode import ModeEquations
 from suboctave.curves.kinds.singular import SingularEquations, SingularOperator
@@ -30,7 +31,7 @@ from suboctave.floquet.held import Grip, grip
 from suboctave.floquet.methods import Monodromy, StabilityMethod
 from suboctave.floquet.result import FloquetResult
 from suboctave.harmonic.basis import Array, ComplexArray
-from suboctave.harmonic.energy import action_along
+from suboctave.harmonic.energy import action_along, action_gradient
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.perturbation import Kind
@@ -197,6 +198,8 @@ class Sample:
             return equations.tau % (2.0 * math.pi)
         if isinstance(equations, ModeEquations):
             return equations.zeta
+        if isinstance(equations, FreePhaseEquations) and isinstance(equations.family, ModeEquations):
+            return equations.family.zeta
         return self.kappa
 
     @property
@@ -253,7 +256,7 @@ class Sample:
         """What decides the normal form: psi . R''[phi, phi] / 2 of an LP, c3 of a PD, psi turned; nan for others."""
         augmentation = self.curve.augmentation.own
         kind = augmentation.kind if isinstance(augmentation, SingularOperator) else Kind.FREE
-        if kind is Kind.FREE:
+        if kind is Kind.FREE or (isinstance(augmentation, FreePhaseOperator) and augmentation.conservative):
             return float("nan")
         # gradients are those of -psi.J phi: `twist` is the g of normal forms, `bend` has the other sign
         turn = 1.0 if self.twist > 0.0 else -1.0
@@ -308,15 +311,15 @@ class Sample:
 
     @lazy
     def others(self) -> ComplexArray:
-        """Multipliers but the one, or the pair, that is critical all along the curve, and of bifurcations of limit
-        cycles the one that is +1 by itself.
+        """Multipliers but the one, or the pair, that is critical all along the curve, and of bifurcations of motions of
+        a free phase those that are +1 by themselves.
         """
         mu, critical = self.evaluation.floquet.multipliers, self.evaluation.critical
         if critical is None:
             return mu
         augmentation = self.curve.augmentation
         if augmentation.free_phase and augmentation.own.name in ("PD", "NS"):
-            mu = _without(mu, 1.0 + 0.0j, False)
+            mu = _without(mu, 1.0 + 0.0j, augmentation.trivial == 2)
         return _without(mu, critical, augmentation.name == "NS" or augmentation.trivial == 2)
 
     @property
@@ -327,12 +330,18 @@ class Sample:
     @lazy
     def fold_of_cycles(self) -> tuple[float, float]:
         """Sign and logarithm of the determinant of `[R_X R_omega; phase condition]`, rows of unit length: zero where
-        the family of limit cycles over the other parameters turns, or crosses another.
+        the family of limit cycles over the other parameters turns, or crosses another. Of conservative modes, which are
+        a family without these, bordered by R_zeta and the derivatives of the action.
         """
         point, state, n = self.point, self.state, self.state.balance.dimension
+        equations = self.evaluation.equations.own
+        assert isinstance(equations, FreePhaseEquations)
         weights = np.append(point.weights[:n], 1.0 / state.omega)
         turning = state.basis.derivative(state.x).ravel() * point.weights[:n]
         matrix = np.vstack((state.extended_jacobian("omega") / weights, np.append(turning, 0.0)))
+        if equations.column is not None:
+            matrix = np.vstack((matrix, action_gradient(state) / weights))
+            matrix = np.column_stack((matrix, np.append(equations.column, [0.0, 0.0])))
         sign, size = np.linalg.slogdet(matrix / np.linalg.norm(matrix, axis=1)[:, None])
         return float(sign), float(size)
 

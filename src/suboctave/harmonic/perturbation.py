@@ -208,6 +208,12 @@ def rate_by_kappa(
     return complex(_Form(state, kind, left, right, kappa).by_frequency().sum())
 
 
+def rate_by_feeding(state: BalanceState, kind: Kind, left: np.ndarray, right: np.ndarray) -> complex:
+    """Derivative of `left^H J_kappa right` by the rate of `LinearPart.fed`, of a real kind."""
+    form = _Form(state, kind, left, right, 0.0)
+    return complex(np.vdot(form.u, _per_wave(state.linear.feeding(form.frequency), form.v)))
+
+
 def parameter_gradient(state: BalanceState, left: Array, name: str, names: tuple[str, ...]) -> Gradient:
     """Derivative of `left . R_name` by the coefficients and by names ("omega" or parameters); `left` of the
     residual's size.

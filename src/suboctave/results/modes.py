@@ -21,6 +21,8 @@ from suboctave.results.branch import TrackedBranch
 #: growth over a period that is none, where harmonics and rounding leave multipliers of a conservative motion off the
 #: unit circle
 ON_CIRCLE = 1e-4
+#: where two more multipliers than those that are +1 by themselves are along curves of events
+_CRITICAL = {"LP": (1.0,), "BP": (1.0,), "PD": (-1.0,)}
 
 
 class ModeCurve(TrackedBranch):
@@ -29,7 +31,7 @@ class ModeCurve(TrackedBranch):
     `system` is that of the mode: without oscillating loads, of the conservative form without damping matrices.
     `bifurcations` has extrema of omega, and branch points (`switch_branch` follows the curve that crosses there); of a
     conservative mode limit points (LP), where the energy turns, and period doublings (PD) as well. The curves of its
-    LP, BP and extrema of omega over a second parameter (`track`) are read in the same way.
+    LP, BP, PD and extrema of omega over a second parameter (`track`) are read in the same way.
     """
 
     @property
@@ -72,9 +74,11 @@ class ModeCurve(TrackedBranch):
         return np.array([modal_amplitude(state) for state in self._states()])
 
     def deciding(self, point: BranchPoint, multipliers: ComplexArray) -> NDArray[np.bool_]:
-        """See `Branch.deciding`: all but the two that are +1 by themselves, and two more on curves of LP and BP."""
+        """See `Branch.deciding`: all but the two that are +1 by themselves, and two more on curves of LP, BP and PD."""
         others = np.ones(len(multipliers), dtype=bool)
-        others[np.argsort(np.abs(multipliers - 1.0), kind="stable")[: 4 if self.kind in ("LP", "BP") else 2]] = False
+        for target in (1.0, *_CRITICAL.get(self.kind, ())):
+            distance = np.where(others, np.abs(multipliers - target), np.inf)
+            others[np.argsort(distance, kind="stable")[:2]] = False
         return others
 
     def stable_at(self, point: BranchPoint) -> bool:

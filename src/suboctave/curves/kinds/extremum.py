@@ -34,6 +34,7 @@ from suboctave.curves.kinds.bordering import bordered_factor, column_sizes, row_
 from suboctave.curves.kinds.branch_point import BranchPointEquations, BranchPointUnfolded
 from suboctave.curves.kinds.singular import SingularEquations, SingularOperator
 from suboctave.harmonic.basis import Array, HarmonicBasis
+from suboctave.harmonic.energy import fed
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.lazy import lazy
 
@@ -68,6 +69,11 @@ class Extremal(Augmentation):
     def free_phase(self) -> bool:
         """As of the bifurcations."""
         return self.base.free_phase
+
+    @property
+    def trivial(self) -> int:
+        """As of the bifurcations."""
+        return self.base.trivial
 
     def multiplier(self, rate: float, extra: Array) -> complex | None:
         return self.base.multiplier(rate, extra)
@@ -300,7 +306,8 @@ class BorderedExtremalEquations(ExtremalEquations):
         else:
             values[name] += step[-1]
         moved = state.balance.at(state.x + state.balance.shaped(step[:n]), omega, values)
-        return self.of.at(moved, self.extra + step[n:-1], self.names)
+        extra = self.extra + step[n:-1]
+        return self.of.at(fed(moved, self.of.base.zeta(extra)), extra, self.names)
 
     @property
     def curvature(self) -> float:

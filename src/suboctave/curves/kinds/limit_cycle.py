@@ -7,7 +7,7 @@ the derivative by tau and < , > the product weighted by masses. Y is kept while 
 closed curve comes back to the phase that it began with.
 
 One multiplier is +1 all along: that of the shift in time. Bifurcations of cycles are singular points of the same
-equations with the conditions of `curves.kinds.singular` besides (`CycleWith`), limit points extrema of p along them.
+equations with the conditions of `curves.kinds.singular` besides (`free_phase`), limit points extrema of p along them.
 """
 
 from __future__ import annotations
@@ -19,7 +19,6 @@ import numpy as np
 from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.continuation.linear import length
 from suboctave.curves.augmentation import Augmentation, Equations
-from suboctave.curves.kinds.singular import SingularEquations, SingularOperator
 from suboctave.errors import InputError
 from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.evaluation import BalanceState
@@ -109,47 +108,3 @@ class CycleEquations(Equations):
         size = length(x)
         alike = float(np.vdot(x, y)) > _RESEMBLES * size * length(y)
         return replace(self.of, size=size) if alike else LimitCycle.of(self.state)
-
-
-@dataclass(frozen=True)
-class CycleWith(SingularOperator):
-    """Limit cycles at a period doubling or a Neimark-Sacker point: the phase condition of `cycle` besides."""
-
-    cycle: LimitCycle
-    free_phase = True
-
-    @classmethod
-    def through(cls, item: Bifurcation, state: BalanceState, names: tuple[str, ...]) -> tuple[CycleWith, Array]:
-        """See `Augmentation.through`."""
-        own, extra = SingularOperator.through(item, state, names)
-        return cls(own.kind, own.borders, own.unit, LimitCycle.of(state)), extra
-
-    def at(self, state: BalanceState, extra: Array, names: tuple[str, ...]) -> CycleWithEquations:
-        return CycleWithEquations(self, state, extra, names)
-
-    def resized(self, basis: HarmonicBasis, size: int) -> CycleWith:
-        return replace(
-            self, borders=self.borders.resized(basis, size, self.kind), cycle=self.cycle.resized(basis, size)
-        )
-
-
-class CycleWithEquations(SingularEquations):
-    """The phase condition and those of the bifurcation."""
-
-    of: CycleWith
-
-    def __init__(self, of: CycleWith, state: BalanceState, extra: Array, names: tuple[str, ...]) -> None:
-        super().__init__(of, state, float(extra[0]) if of.extras else 0.0, names)
-        self.cycle = of.cycle.at(state, extra, names)
-
-    @lazy
-    def values(self) -> Array:
-        return np.concatenate((self.cycle.values, super().values))
-
-    @property
-    def rows(self) -> Array:
-        return np.concatenate((self.cycle.beside(self.of.extras), super().rows))
-
-    def renewed(self) -> CycleWith:
-        own = super().renewed()
-        return CycleWith(own.kind, own.borders, own.unit, self.cycle.renewed())

@@ -12,6 +12,7 @@ extended periodic motion concept (Krack, Nonlinear modal analysis of nonconserva
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -80,24 +81,38 @@ class ModeEquations(CycleEquations):
 
     def jacobian(self, names: tuple[str, ...]) -> Array:
         out, n = super().jacobian(names), self.state.balance.dimension
-        # omega is a factor of the rate
-        out[:n, n + 1] += self.zeta / self.state.omega * self.column
-        for i, name in enumerate(names[1:], n + 2):
-            if self.zeta and name in self.state.balance.system.mass.names:
-                out[:n, i] += self.zeta * self._column_by(name)
+        out[:n, n + 1 :] += self.through_zeta(_by_zeta, names)[:, 1:]
         return out
 
-    def _column_by(self, name: str) -> Array:
-        """The derivative of `column` by a parameter that masses depend on: a central difference."""
+    def through_zeta(self, by_zeta: Callable[[BalanceState], Array], names: tuple[str, ...]) -> Array:
+        """What the forces of zeta do to the derivatives of R, or of a form, by zeta and the free parameters: a column
+        each, (m, 1 + number of names); `by_zeta` is that by zeta at a motion, (m,).
+
+        omega, the first of names, is a factor of these forces, and parameters may change the masses.
+        """
+        own = by_zeta(self.state)
+        columns = [own, self.zeta / self.state.omega * own]
+        for name in names[1:]:
+            moves = bool(self.zeta) and name in self.state.balance.system.mass.names
+            columns.append(self.zeta * self._slope(by_zeta, name) if moves else np.zeros_like(own))
+        return np.stack(columns, axis=1)
+
+    def _slope(self, function: Callable[[BalanceState], Array], name: str) -> Array:
+        """The derivative of a function of the motion by a parameter: a central difference."""
         state, value = self.state, self.state.values[name]
         step = _STEP * (abs(value) or 1.0)
         beside = [{**state.values, name: value + side * step} for side in (1.0, -1.0)]
-        ahead, behind = (_by_zeta(state.balance.at(state.x, state.omega, values)) for values in beside)
+        ahead, behind = (function(state.balance.at(state.x, state.omega, values)) for values in beside)
         return (ahead - behind) / (2.0 * step)
 
     def renewed(self) -> NonlinearMode:
         own = super().renewed()
         return replace(self.of, reference=own.reference, basis=own.basis, size=own.size)
+
+
+def of_modes(item: Bifurcation) -> bool:
+    """Whether something was located along nonlinear modes, or along curves of their events."""
+    return "damped" in (item.context or {})
 
 
 def _by_zeta(state: BalanceState) -> Array:

@@ -99,7 +99,7 @@ class SingularEquations(Equations):
     @lazy
     def values(self) -> Array:
         g = self.bordered.g / self.of.unit
-        return np.array([g.real, g.imag] if self.of.extras else [g.real])
+        return np.array([g.real, g.imag] if self.of.kind is Kind.FREE else [g.real])
 
     @lazy
     def gradient(self) -> Gradient:
@@ -119,7 +119,7 @@ class SingularEquations(Equations):
     @property
     def rows(self) -> Array:
         by_x, rates, by_kappa = self.gradient
-        if not self.of.extras:
+        if self.of.kind is not Kind.FREE:
             return np.append(by_x.real, [rates[name].real for name in self.names])[None] / self.of.unit
         whole = np.concatenate((by_x, [by_kappa], [rates[name] for name in self.names])) / self.of.unit
         return np.array([whole.real, whole.imag])

@@ -32,6 +32,7 @@ from suboctave.curves.augmentation import Augmentation
 from suboctave.curves.hopf import hopf_beside
 from suboctave.curves.junction import NOTHING_LEFT, doubled_size, subharmonic_share
 from suboctave.curves.kinds.branch_point import BranchPointUnfolded
+from suboctave.curves.kinds.free_phase import FreePhaseOperator
 from suboctave.curves.kinds.limit_cycle import LimitCycle, oscillating
 from suboctave.curves.kinds.singular import SingularOperator
 from suboctave.curves.motion import MotionProblem
@@ -304,13 +305,15 @@ def _resonance(a: Sample, double: bool, newton: NewtonOptions) -> End:
     """The 1:1 or 1:2 resonance in which an NS curve ends, located on the LP, BP or PD curve through it."""
     order = 2 if double else 1
     ends = f"the curve ends in a 1:{order} resonance"
-    if a.curve.augmentation.turning or a.curve.augmentation.free_phase:
+    own = a.curve.augmentation
+    if own.turning or (own.free_phase and not double):
         return End(f"{ends} beyond {a.where}")
     balance, name = a.curve.balance, a.curve.names[0]
     state = balance.at(a.state.x, a.state.omega, a.state.values)
     # limit points of motions with a symmetry may be branch points, where the equations of limit points are singular
+    singular = own.of_kind if isinstance(own, FreePhaseOperator) else SingularOperator.of
     singled_out: list[Callable[[], Augmentation]] = [
-        partial(SingularOperator.of, state, Kind.HALF if double else Kind.INTEGER),
+        partial(singular, state, Kind.HALF if double else Kind.INTEGER),
         partial(BranchPointUnfolded.of, state, name),
     ]
     failures = []

@@ -16,14 +16,14 @@ from suboctave.continuation.newton import null_row
 from suboctave.curves.augmentation import Augmentation
 from suboctave.curves.events.formulation import BORDERED, Formulation
 from suboctave.curves.kinds.extremum import BorderedExtremal, LimitPointExtremal
-from suboctave.curves.kinds.limit_cycle import CycleWith
+from suboctave.curves.kinds.free_phase import FreePhaseOperator
 from suboctave.curves.kinds.mode_event import MODE_EVENTS
-from suboctave.curves.kinds.nonlinear_mode import NonlinearMode
+from suboctave.curves.kinds.nonlinear_mode import NonlinearMode, of_modes
 from suboctave.curves.kinds.singular import SingularOperator
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.starts import own_linear_part, settled
 from suboctave.curves.trace import Settings
-from suboctave.errors import ConvergenceError
+from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.evaluation import HarmonicBalance
 from suboctave.harmonic.truncation import AdaptiveHarmonics
@@ -62,6 +62,20 @@ def on_mode(item: Bifurcation) -> bool:
     return isinstance(item, TrackedEvent) and item.curve == NonlinearMode.name and len(item.names) == 1
 
 
+def _equations(item: Bifurcation, names: tuple[str, ...], formulation: Formulation) -> type[Augmentation]:
+    """Those of the curve through a located point; InputError where it has none."""
+    if on_free_phase(item) or (of_modes(item) and kind_of(item) == "PD"):
+        return FreePhaseOperator
+    if on_mode(item) and len(names) == 2:
+        return MODE_EVENTS[item.kind]
+    if of_modes(item) and is_extremum(item):
+        raise InputError(
+            f"this extremum lies on a curve of events of nonlinear modes in {', '.join(item.names)}: of the extrema "
+            "along these, those of PD can be followed in another parameter"
+        )
+    return formulation.equations(kind_of(item))
+
+
 def curve_through(
     item: Bifurcation,
     basis: HarmonicBasis,
@@ -78,9 +92,7 @@ def curve_through(
     widths = {**(item.context or {}).get("bounds", {})} if is_extremum(item) else {}
     widths |= ranges or {}
     spans = [abs(float(widths[n][1]) - float(widths[n][0])) if n in widths else abs(item.parameter(n)) for n in names]
-    equations: type[Augmentation] = CycleWith if on_free_phase(item) else formulation.equations(kind_of(item))
-    if on_mode(item) and len(names) == 2:
-        equations = MODE_EVENTS[item.kind]
+    equations = _equations(item, names, formulation)
     linear, x = own_linear_part(orbit), orbit.x
     if linear is not None and equations.reads_observed:
         linear = linear.holding(item.context["observe"])

@@ -10,7 +10,8 @@
                       curves, as of NS points along a branch: a complex pair passes it
     NSNS              the same on NS curves
     LP, BP, PD, NS    the same on curves of motions that need no critical multiplier (`MOTION_KINDS`)
-    LPPD, LPNS        of limit cycles, where J_0 is singular all along: det [R_X R_omega; phase condition]
+    LPPD, LPNS        of limit cycles, where J_0 is singular all along: det [R_X R_omega; phase condition]; LPPD of
+                      conservative modes: the same bordered by R_zeta and the derivatives of the action
     LP, BP            of motions of a free phase, where J_0 is singular all along: the last parameter turns, of
                       conservative modes the action; the orientation of the curve changes
 
@@ -31,6 +32,7 @@ import numpy as np
 from suboctave.bifurcation.bordered import NullVectors, bordered, null_vectors, transversality
 from suboctave.continuation.linear import length
 from suboctave.continuation.point import crossing_matrix
+from suboctave.curves.kinds.free_phase import FreePhaseOperator
 from suboctave.curves.kinds.nonlinear_mode import NonlinearMode
 from suboctave.curves.kinds.ridge import Ridge, RidgeEquations
 from suboctave.curves.kinds.singular import SingularOperator
@@ -408,8 +410,10 @@ class PairCrossing(CurveTest):
             kappa -= change.real
             if abs(kappa - start) > _STRAYED * rate:
                 return growth
-        exponent = float(change.imag) * 2.0 * np.pi / rate
+        exponent, critical = float(change.imag) * 2.0 * np.pi / rate, sample.evaluation.critical
         # other multipliers, the critical one among them, have zeros of g as well
+        if critical is not None and abs(kappa - abs(np.angle(critical)) * rate / (2.0 * np.pi)) <= abs(kappa - start):
+            return growth
         return exponent if abs(exponent - growth) <= _AGREES * max(abs(growth), _STRAYED) else growth
 
     def confirmed(self, sample: Sample) -> bool:
@@ -512,6 +516,8 @@ _OF_CYCLES: dict[Kind, tuple[CurveTest, ...]] = {
         PairCrossing("NSNS"),
     ),
 }
+#: of conservative modes two multipliers are -1 all along, and no pair leaves the unit circle alone
+_OF_MODES: tuple[CurveTest, ...] = (FoldOfCycles("LPPD"),)
 
 
 def tests_of(curve: MotionProblem) -> tuple[CurveTest, ...]:
@@ -520,8 +526,8 @@ def tests_of(curve: MotionProblem) -> tuple[CurveTest, ...]:
     if own.free_phase:
         if curve.augmentation is not own:
             return turns
-        if isinstance(own, SingularOperator):
-            return turns + _OF_CYCLES[own.kind]
+        if isinstance(own, FreePhaseOperator):
+            return turns + (_OF_MODES if own.conservative else _OF_CYCLES[own.kind])
         if isinstance(own, NonlinearMode):
             # the determinant of J_half costs less than multipliers, which nothing else asks for at every point
             return (
