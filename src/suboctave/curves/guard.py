@@ -143,13 +143,14 @@ class GuardedStep(Interior):
         every change that lies between is seen: two real multipliers that meet and cross the circle as a pair are a pair
         only from close by.
 
-        A pair that crosses the circle is seen in the count of unstable multipliers: it wants an interval of its own.
+        A pair that crosses the circle is seen in the count of unstable multipliers: it wants an interval of its own,
+        but not one that ends where the count is open.
         """
         first, *_, last = samples = self.inside
         kept, since = [first], set[str]()
         for p, q in pairwise(samples) if len(samples) > 2 else ():
             now = {kind.name for kind in changes(p, q)}
-            crowded = now & since or (now and since and "NS" in now | since)
+            crowded = now & since or (now and since and "NS" in now | since and p.floquet.decided)
             if p is not kept[-1] and (crowded or {kind.name for kind in changes(kept[-1], q)} != now | since):
                 kept.append(p)
                 since = set()
