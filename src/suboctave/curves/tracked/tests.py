@@ -459,7 +459,10 @@ class Doubling(RealCrossing):
     operator: Kind = Kind.HALF
 
     def smooth(self, sample: Sample) -> tuple[float, float]:
-        # what more harmonics do to a determinant is no matter of the motion
+        if sample.half_wave:
+            return 1.0, 0.0
+        # no matter of the motion are what more harmonics do to a determinant, and its poles at resonances of what is
+        # eliminated
         sign, size = symmetric_functions(sample.others)[:, 1].tolist()
         return sign, size
 
@@ -511,12 +514,7 @@ def tests_of(curve: MotionProblem) -> tuple[CurveTest, ...]:
         if isinstance(own, SingularOperator):
             return turns + _OF_CYCLES[own.kind]
         if isinstance(own, NonlinearMode):
-            # the determinant of J_half costs less than multipliers, which nothing else asks for at every point
-            return (
-                *turns,
-                CurvesCross(),
-                *((ActionTurns(), RealCrossing("PD", Kind.HALF)) if own.conservative else ()),
-            )
+            return (*turns, CurvesCross(), *((ActionTurns(), Doubling()) if own.conservative else ()))
         return (*turns[:-1], TurningPoint(curve.name), CurvesCross(), *_CROSSINGS)
     if own.name in MOTION_KINDS:
         peaks = (PeakTurns(),) if isinstance(own, Ridge) else ()
