@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -31,9 +31,10 @@ from suboctave.curves.motion import MotionProblem
 from suboctave.curves.other_branch import crossing_point
 from suboctave.curves.sample import Sample
 from suboctave.curves.trace import joined
-from suboctave.curves.tracked.tests import CurvesCross, CurveTest, Cusp, Extremum
+from suboctave.curves.tracked.tests import CurvesCross, CurveTest, Cusp, Extremum, PairCrossing
 from suboctave.errors import ConvergenceError
 from suboctave.floquet.methods import StabilityMethod
+from suboctave.floquet.symmetric import least_factor
 from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.truncation import choose_harmonics
 
@@ -482,6 +483,11 @@ class _Step(Interior):
 
     def measures(self, sample: Sample) -> Array:
         return self.steps.functions(sample)
+
+    def relative(self, stencil: Sequence[Sample], k: int) -> Iterator[Array]:
+        """See `Interior.relative`: with the least factor of `torus`."""
+        if isinstance(self.steps.tests[k], PairCrossing):
+            yield np.array([least_factor(sample.others) for sample in stencil])
 
     def solve(self, fraction: float) -> Sample:
         return Sample(point_between(self.old.point, self.new.point, fraction, self.steps.newton))
