@@ -163,3 +163,5 @@ def test_a_step_whose_interior_has_no_solution_is_halved(systems: ModuleType, hi
     assert max(event.uncertainty for event in border.bifurcations) < 1e-6
     # behind a grazing c3 grows as the cube of the inverse speed at which the gap is crossed: no zeros are near
     assert not any("GPD may lie" in note for note in border.warnings)
+    # and where it jumps from there to the other sign there is none
+    assert not any("GPD near" in note for note in border.warnings)
