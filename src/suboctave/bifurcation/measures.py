@@ -97,9 +97,9 @@ def crossing_pair(
     # may be one where a pair lies on the circle
     if leaving == 0 or max(products) < UNDAMPED:
         return None
-    behind, before = (1, 0) if leaving > 0 else (0, 1)
-    out, within = outside[behind], pairs[before][np.abs(pairs[before]) <= 1.0]
-    if not (len(out) and len(within)):
+    inner = pairs[0 if leaving > 0 else 1]
+    inner, outer = inner[np.abs(inner) <= 1.0], outside[1 if leaving > 0 else 0]
+    if not (len(inner) and len(outer)):
         return None
-    members = min(product(within, out), key=lambda pair: abs(pair[0] - pair[1]))
-    return complex(members[before]), complex(members[behind])
+    within, beyond = min(product(inner.tolist(), outer.tolist()), key=lambda pair: abs(pair[0] - pair[1]))
+    return (within, beyond) if leaving > 0 else (beyond, within)
