@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from chains import chain_matrices
 from pages import blocks, check_prints
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, fsolve
@@ -110,6 +111,29 @@ def test_the_tongue_leads_to_the_other_mode(lower, tongue):
     for item in tongue.bifurcations["LP"]:
         assert np.abs(item.multipliers - 1.0).max() < 2e-2
     assert tongue.energy.max() == pytest.approx(148.660, abs=1e-2)
+
+
+def mode_of_a_chain(n, element, amplitude):
+    mass, stiffness = (matrix.toarray() for matrix in chain_matrices(n))
+    return so.nonlinear_mode(so.System(mass, np.zeros((n, n)), stiffness, elements=[element]), 2, amplitude=amplitude)
+
+
+def test_pairs_pass_minus_one_on_the_circle():
+    """Nothing doubles where perturbations meet the same in both halves of the period: det J_half only touches zero."""
+    mode = mode_of_a_chain(3, so.CubicSpring(2, 1.0), (0.01, 3.0))
+    leftmost = np.array([mu[np.argmin(mu.real)] for mu in (point.floquet.multipliers for point in mode.points)])
+    near = leftmost[np.abs(leftmost + 1.0) < 0.3]
+    assert np.abs(near + 1.0).min() < 0.03
+    assert np.abs(near) == pytest.approx(1.0, abs=1e-6)
+    assert not mode.bifurcations["PD"]
+    assert not any("PD may lie" in note for note in mode.warnings)
+
+
+def test_a_resonance_of_what_is_eliminated_leaves_nothing_in_doubt():
+    """The determinant of J_half has a pole where the chain resonates with its stop's displacement held."""
+    mode = mode_of_a_chain(8, so.ElasticStop(7, stiffness=5.0, gap=0.5), (0.3, 3.0))
+    assert [round(item.omega, 4) for item in mode.bifurcations["PD"]] == [3.0326, 3.0445, 3.0445]
+    assert not any("PD may lie" in note for note in mode.warnings)
 
 
 def test_every_motion_of_a_tongue_is_one(tongue):

@@ -124,6 +124,36 @@ def test_as_many_are_outside_as_the_phase_of_the_determinant_turns():
     assert {0, 1} <= set(counts)
 
 
+def test_a_pair_is_found_where_the_viscous_equivalent_has_two_real_ones():
+    """With a loss factor of 0.2 they part elsewhere: the pair goes on, and nothing is in doubt where they meet."""
+    branch = so.frequency_response(duffing(0.2, 0.5), (0.6, 2.0))
+    upper, _ = branch.bifurcations["LP"]
+    before = [point for point in branch.points if -0.12 < point.arclength - upper.arclength < -0.03]
+    assert len(before) >= 2
+    for point in before:
+        (mu, other), errors = point.floquet.multipliers, point.floquet.errors
+        assert mu.imag != 0.0
+        assert mu == other.conjugate()
+        assert errors.max() < 1e-3
+        # det J_kappa vanishes
+        kappa = abs(np.angle(mu)) / (2.0 * np.pi) - 1j * np.log(abs(mu)) / (2.0 * np.pi)
+        beside, state = np.array([0.0, 1e-3]), point.orbit.state()
+        waves = np.arange(-state.basis.harmonics, state.basis.harmonics + 1)
+        at, near = np.linalg.slogdet(operator_at(state, ((kappa + beside)[:, None] + waves) * state.rate))[1]
+        assert at < near - 10.0
+    assert not branch.audit.unsettled
+
+
+def test_pairs_of_no_matter_leave_nothing_in_doubt_along_a_ridge():
+    """Pairs that begin where no real ones meet make the product of all 1 - mu_i mu_j jump, but not its least factor."""
+    springs = 2.0 * np.eye(6) - np.eye(6, k=1) - np.eye(6, k=-1)
+    cubic, load = so.CubicSpring(3, 0.5), so.HarmonicLoad(0, 0.3)
+    chain = so.System(np.eye(6), 0.0 * springs, springs, [cubic], [load], {"eta": 0.03}, structural={"eta": springs})
+    ridge = so.track_peak(so.frequency_response(chain, (0.5, 0.8)), "eta", (0.02, 0.034))
+    assert len(ridge.bifurcations["NS"]) == 1
+    assert not ridge.warnings
+
+
 def test_bifurcations_are_tracked_over_the_loss_factor():
     (fold, _) = so.frequency_response(duffing(), (0.6, 2.2), harmonics=7).bifurcations
     curve = so.track(fold, "eta", (0.03, 0.08))

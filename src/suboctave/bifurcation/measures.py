@@ -14,11 +14,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
 from suboctave.floquet.result import FloquetResult
-from suboctave.harmonic.basis import Array
+from suboctave.floquet.symmetric import UNDAMPED
+from suboctave.harmonic.basis import Array, ComplexArray
+
+#: imaginary part, as a share of the modulus, up to which a multiplier counts as real
+_REAL = 1e-9
 
 
 def measured(tangent: Array, weights: Array, parameter: int, result: FloquetResult) -> Array:
@@ -62,3 +67,39 @@ def in_doubt(result: FloquetResult, integer: float, half: float) -> FloquetResul
     for which, distance in contradictions:
         errors[which] = max(errors[which], 2.0 * distance)
     return replace(result, errors=errors)
+
+
+def upper(mu: ComplexArray) -> ComplexArray:
+    """The complex multipliers of the upper half plane."""
+    return mu[mu.imag > _REAL * np.abs(mu)]
+
+
+def crossing_pair(
+    first: ComplexArray, last: ComplexArray, change: int, accounted: int
+) -> tuple[complex, complex] | None:
+    """The complex pair that crosses the unit circle between two neighbours, by its members in the upper half plane.
+
+    change: of the number of multipliers outside the circle; accounted: how many real ones pass +1 or -1. Where as many
+    pairs are complex at both, none has met on the real axis or parted there: those outside tell, if the real ones then
+    change by no more than what is accounted for. Elsewhere a real one may have become one of a pair, and a change
+    beyond what is accounted for tells alone.
+    """
+    pairs = [upper(first), upper(last)]
+    outside = [mu[np.abs(mu) > 1.0] for mu in pairs]
+    more = len(outside[1]) - len(outside[0])
+    if len(pairs[0]) == len(pairs[1]) and abs(change - 2 * more) <= accounted:
+        leaving = more
+    else:
+        leaving = change if abs(change) >= accounted + 2 else 0
+    with np.errstate(divide="ignore"):
+        products = [abs(float(np.log(np.abs(mu)).sum())) for mu in (first, last)]
+    # without damping pairs stay on the circle and rounding alone carries them across; of one point alone the product
+    # may be one where a pair lies on the circle
+    if leaving == 0 or max(products) < UNDAMPED:
+        return None
+    inner = pairs[0 if leaving > 0 else 1]
+    inner, outer = inner[np.abs(inner) <= 1.0], outside[1 if leaving > 0 else 0]
+    if not (len(inner) and len(outer)):
+        return None
+    within, beyond = min(product(inner.tolist(), outer.tolist()), key=lambda pair: abs(pair[0] - pair[1]))
+    return (within, beyond) if leaving > 0 else (beyond, within)

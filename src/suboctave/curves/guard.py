@@ -149,13 +149,15 @@ class GuardedStep(Interior):
         every change that lies between is seen: two real multipliers that meet and cross the circle as a pair are a pair
         only from close by.
 
-        A pair that crosses the circle is seen in the count of unstable multipliers: it wants an interval of its own.
+        A pair that crosses the circle is seen in the count of unstable multipliers: it wants an interval of its own,
+        but not one that ends where the count is open.
         """
         first, *_, last = samples = self.inside
         kept, since = [first], set[BifurcationKind]()
         for p, q in pairwise(samples) if len(samples) > 2 else ():
             now = set(changes(p, q))
-            crowded = now & since or (now and since and NEIMARK_SACKER in now | since)
+            pairs = any(kind.name == "NS" for kind in now | since)
+            crowded = now & since or (now and since and pairs and p.floquet.decided)
             if p is not kept[-1] and (crowded or set(changes(kept[-1], q)) != now | since):
                 kept.append(p)
                 since = set()

@@ -36,7 +36,7 @@ from suboctave.curves.trace import Unsettled
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.trigonometric import passages
 
-__all__ = ["FINEST", "Interior", "Steps", "unsettled"]
+__all__ = ["FINEST", "Interior", "Steps", "contacts_between", "unsettled"]
 
 #: intervals of scaled arclength that are not cut any further: events closer together are not told apart
 FINEST = 1e-5
@@ -99,7 +99,7 @@ class Steps:
         """What contacts do between two samples."""
         known = self._contacts.get((p, q))
         if known is None:
-            known = self._contacts[p, q] = _contacts_between(p, q)
+            known = self._contacts[p, q] = contacts_between(p, q)
         return known
 
     def leading_to(self, old: Sample) -> list[Sample]:
@@ -120,7 +120,8 @@ class Steps:
         self._behind = []
 
 
-def _contacts_between(p: Sample, q: Sample) -> Contacts:
+def contacts_between(p: Sample, q: Sample) -> Contacts:
+    """What contacts do between two samples."""
     shrinking: list[tuple[int, float, float, bool]] = []
     for n, (a, b, young_a, young_b) in enumerate(zip(p.gaps, q.gaps, p.young, q.young, strict=True)):
         pairs, count, crossed, other = passages(a.tau, a.value, a.curve, a.level, b.tau, b.value, b.curve, b.level)

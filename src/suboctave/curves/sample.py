@@ -297,6 +297,14 @@ class Sample:
         return sign, logarithm - units
 
     @lazy
+    def half_wave(self) -> bool:
+        """Whether perturbations meet the same stiffness and damping in both halves of the period. Those of half-odd
+        harmonics are two sets then, conjugates of each other, and det J_half is the square of a modulus: pairs on the
+        unit circle pass -1 (Swift & Wiesenfeld, Physical Review Letters 52, 1984).
+        """
+        return all(channel.half_wave for channel in self.state.channels)
+
+    @lazy
     def _half(self) -> Factor:
         return Factor.of(self.state.half_jacobian)
 

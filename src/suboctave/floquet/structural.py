@@ -11,9 +11,10 @@ that does not oscillate is not damped by S, one that oscillates slowly is: pairs
 where two real ones meet.
 
 The search begins at the multipliers of the viscous equivalent, whose modes are damped as much at their own frequencies:
-Newton's method on the determinant, with Aberth's correction (Math. Comp. 27 (1973) 339-344), which keeps roots that are
-searched for together apart. A multiplier without a root near it belongs to a vibration that elements hardly see, and
-stays where it is.
+Newton's method on the determinant, with Aberth's correction (Math. Comp. 27 (1973) 339-344), which keeps roots apart,
+and for pairs within 0 < Re kappa < w0 / 2, where the determinant is analytic. Two real multipliers of the equivalent
+without roots may be a pair: structural damping parts or joins two at another place. A multiplier without a root near it
+belongs to a vibration that elements hardly see, and stays where it is.
 """
 
 from __future__ import annotations
@@ -34,10 +35,13 @@ _NEAR = 0.1
 #: moved them those are away from the circle that need no search
 _AT_ONCE, _BEYOND = 4, 3.0
 #: most steps, the last one, and the distance over which a determinant is differentiated, in units of the base frequency
-_STEPS, _CLOSE, _APART = 10, 1e-10, 1e-7
+_STEPS, _CLOSE, _APART = 20, 1e-10, 1e-7
 #: farthest from where its search began that a root is taken for the same, in units of the base frequency, and distance
 #: up to which two are one
 _FAR, _SAME = 0.2, 1e-8
+#: least distance from 0 and w0 / 2 at which the search for a pair begins, in units of the base frequency, and the share
+#: of its distance that one step leaves
+_INSIDE, _LEFT = 0.01, 0.3
 #: how much of its decay in a period is in doubt, of a multiplier that was not found
 _DOUBT = 0.5
 
@@ -47,44 +51,52 @@ def with_structural_damping(state: BalanceState, viscous: FloquetResult) -> Floq
     if not viscous.applicable:
         return viscous
     mu, errors = viscous.multipliers.copy(), viscous.errors.copy()
-    with np.errstate(divide="ignore"):
-        decay = np.log(np.abs(mu))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        decay, exponent = np.log(np.abs(mu)), np.log(mu) / (2j * math.pi)
     near = np.flatnonzero(np.abs(mu) > _NEAR)
     errors[near] = np.maximum(errors[near], _DOUBT * np.abs(decay[near] * mu[near]))
-    real = near[mu[near].imag == 0.0]
-    pairs = near[mu[near].imag > 0.0]
-    pairs = pairs[np.argsort(np.abs(decay[pairs]), kind="stable")]
-    groups = [real[mu[real].real > 0.0], real[mu[real].real < 0.0]]
-    groups += [pairs[i : i + _AT_ONCE] for i in range(0, len(pairs), _AT_ONCE)]
-    moved = 0.0
-    for group in groups:
-        if not len(group):
-            continue
-        on_axis = bool(mu[group[0]].imag == 0.0)
-        if not on_axis and 0.0 < _BEYOND * moved < np.abs(decay[group]).min():
+    known: list[complex] = []
+    pairs: list[tuple[int, int]] = [
+        (int(i), int(np.argmin(np.abs(mu - mu[i].conjugate())))) for i in near if mu[i].imag > 0.0
+    ]
+    for side in (1.0, -1.0):
+        real = near[(mu[near].imag == 0.0) & (side * mu[near].real > 0.0)]
+        roots = _roots(state, exponent[real], known, True)
+        for i, root in zip(real, roots, strict=True):
+            if root is not None:
+                mu[i], errors[i] = np.exp(2j * math.pi * root).real, viscous.errors[i]
+        left = [int(i) for i, root in zip(real, roots, strict=True) if root is None]
+        pairs += zip(left[::2], left[1::2], strict=False)
+    moved = float(np.abs(np.log(np.abs(mu[near])) - decay[near]).max(initial=0.0))
+    middle = {own: complex(exponent[own[0]].real, exponent[list(own)].imag.mean()) for own in pairs}
+    pairs.sort(key=lambda own: abs(middle[own].imag))
+    for group in (pairs[k : k + _AT_ONCE] for k in range(0, len(pairs), _AT_ONCE)):
+        if 0.0 < _BEYOND * moved < 2.0 * math.pi * abs(middle[group[0]].imag):
             break
-        # a pair is found with its conjugate
-        others = [int(np.argmin(np.abs(mu - value.conjugate()))) for value in mu[group]]
-        kappa, found = _roots(state, np.log(mu[group]) / (2j * math.pi), on_axis)
-        for i in np.flatnonzero(found):
-            one = np.exp(2j * math.pi * kappa[i])
-            one = complex(one.real) if on_axis else complex(one)
-            moved = max(moved, abs(math.log(abs(one)) - decay[group[i]]))
-            mu[others[i]], mu[group[i]] = one.conjugate(), one
-            errors[others[i]] = errors[group[i]] = viscous.errors[group[i]]
+        roots = _roots(state, np.array([middle[own] for own in group]), known, False)
+        for own, root in zip(group, roots, strict=True):
+            if root is not None:
+                one = complex(np.exp(2j * math.pi * root))
+                moved = max(moved, 2.0 * math.pi * abs(root.imag - middle[own].imag))
+                mu[list(own)], errors[list(own)] = (one, one.conjugate()), viscous.errors[own[0]]
     order = np.argsort(-np.abs(mu), kind="stable")
     return replace(viscous, multipliers=mu[order], errors=errors[order], method="structural damping")
 
 
-def _roots(state: BalanceState, start: ComplexArray, on_axis: bool) -> tuple[ComplexArray, np.ndarray]:
-    """Roots kappa of det J_kappa in units of the base frequency, (G,), and which were found.
+def _roots(state: BalanceState, start: ComplexArray, known: list[complex], on_axis: bool) -> list[complex | None]:
+    """Roots kappa of det J_kappa in units of the base frequency, None where none was found; `known` are those found
+    before, to which they are added.
 
     start: all with the real part 0, all with 1 / 2 (`on_axis`), or all between.
     """
+    if not len(start):
+        return []
     high = state.basis.harmonics
     # closed under conjugation where the determinant is real
     waves = np.arange(-high - int(on_axis and start[0].real != 0.0), high + 1)
     kappa, step, ahead = start.copy(), np.full(len(start), np.inf, dtype=complex), 1j * _APART
+    if not on_axis:
+        kappa.real = np.clip(kappa.real, _INSIDE, 0.5 - _INSIDE)
     left = np.arange(len(start))
     for _ in range(_STEPS):
         both = np.concatenate((kappa[left], kappa[left] + ahead))
@@ -93,17 +105,25 @@ def _roots(state: BalanceState, start: ComplexArray, on_axis: bool) -> tuple[Com
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             newton = np.where(sign == 0.0, 0.0, -ahead / (turned / sign * np.exp(longer - log) - 1.0))
             # Aberth's correction: each stays away from where the others are going
-            apart = kappa[left][:, None] - kappa
+            apart = kappa[left][:, None] - np.append(kappa, known)
             apart[np.arange(len(left)), left] = np.inf
             newton = newton / (1.0 + newton * np.sum(1.0 / apart, axis=1))
-        step[left] = 1j * newton.imag if on_axis else newton
-        kappa[left] += step[left]
+        if on_axis:
+            newton = 1j * newton.imag
+        else:
+            ahead_of, room = (
+                kappa[left].real + newton.real,
+                _LEFT * np.minimum(kappa[left].real, 0.5 - kappa[left].real),
+            )
+            newton.real = np.clip(ahead_of, room, 0.5 - room) - kappa[left].real
+        step[left] = newton
+        kappa[left] += newton
         left = left[(np.abs(step[left]) > _CLOSE) & (np.abs(kappa[left] - start[left]) <= _FAR)]
         if not len(left):
             break
-    found = (np.abs(step) <= _CLOSE) & (np.abs(kappa - start) <= _FAR)
-    if not on_axis:
-        found &= (kappa.real > 0.0) & (kappa.real < 0.5)
-    for i in range(1, len(kappa)):
-        found[i] &= not np.any(found[:i] & (np.abs(kappa[:i] - kappa[i]) <= _SAME))
-    return kappa, found
+    roots: list[complex | None] = []
+    for root, last, begun in zip(kappa.tolist(), step.tolist(), start.tolist(), strict=True):
+        found = abs(last) <= _CLOSE and abs(root - begun) <= _FAR and all(abs(root - one) > _SAME for one in known)
+        roots.append(root if found else None)
+        known += [root] if found else []
+    return roots

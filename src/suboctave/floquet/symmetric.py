@@ -92,6 +92,20 @@ def multiply(mu, k, column, out):
         out[1, c] = 0.5 * (out[1, c] + np.log(product[c]))
 
 
+def least_factor(mu: ComplexArray) -> Array:
+    """Sign of `torus` and logarithm of the modulus of the least of its factors that may change sign, those of
+    conjugates and of two real ones of equal sign, shape (2, 1): zero where torus is, whatever its other factors do.
+    """
+    real = mu.real[mu.imag == 0.0]
+    i, j = np.triu_indices(len(real), 1)
+    products = np.append(np.abs(mu[mu.imag > 0.0]) ** 2, (real[i] * real[j])[real[i] * real[j] > 0.0])
+    factors = (1.0 - products) / np.sqrt(1.0 + products**2)
+    if not factors.size or abs(float(np.log(np.abs(mu)).sum())) < UNDAMPED:
+        return np.array([[1.0], [0.0]])
+    with np.errstate(divide="ignore"):
+        return np.array([[np.prod(np.where(factors < 0.0, -1.0, 1.0))], [np.log(np.abs(factors).min())]])
+
+
 @kernel()
 def in_rings(mu, k):
     """fold, double or torus (k = 0, 1, 2) of neighbouring motions with multipliers (N, m), by descending modulus, as

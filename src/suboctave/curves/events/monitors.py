@@ -6,8 +6,9 @@ neighbours, where in between, how to solve for it, and whether a solution is one
 - LP: the component of the tangent along the free parameter changes sign;
 - BP: the bordered determinant `det [R_X R_omega; t]` changes sign, the branch going straight on;
 - PD: det J_half changes sign;
-- NS: the number of multipliers outside the unit circle changes by pairs that no LP, BP or PD accounts for. Two real
-  multipliers with product one (a neutral saddle) never cross the circle and are not counted;
+- NS: complex pairs of multipliers cross the unit circle, by the number of those outside, or by that of all multipliers
+  outside where it changes by more than LP, BP and PD account for. Two real multipliers with product one (a neutral
+  saddle) never cross the circle and are not counted;
 - multiple BP, PD and NS: several multipliers pass one place on the circle, alike before and behind it.
 
 First the bordered system is solved from an interpolated start; where that does not converge into the step, the step is
@@ -29,6 +30,7 @@ import numpy as np
 
 from suboctave.bifurcation.bordered import null_vectors, transversality
 from suboctave.bifurcation.gaps import GrazingContact
+from suboctave.bifurcation.measures import crossing_pair, upper
 from suboctave.continuation.linear import length
 from suboctave.continuation.newton import NewtonOptions
 from suboctave.continuation.point import CurvePoint, between, point_between
@@ -37,7 +39,6 @@ from suboctave.curves.events.formulation import BORDERED, Formulation
 from suboctave.curves.events.locate import Guess, Singular, locate_branch_point, locate_multiple
 from suboctave.curves.sample import Sample
 from suboctave.errors import ConvergenceError
-from suboctave.floquet.symmetric import UNDAMPED
 from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.perturbation import Kind
 
@@ -163,41 +164,29 @@ class NeimarkSacker(BifurcationKind):
     counted = True
 
     def changed(self, a: Sample, b: Sample) -> bool:
-        """Count of unstable multipliers changed by more than LP, BP and PD account for."""
         return any(kind.name == "NS" for kind in changes(a, b))
 
-    def beyond(self, a: Sample, b: Sample, accounted: int) -> bool:
-        """Whether a pair crosses the circle, `accounted` changes of the count being explained by others."""
-        return abs(a.unstable - b.unstable) >= accounted + 2 and self._pair(a, b) is not None
-
     @staticmethod
-    def _pair(a: Sample, b: Sample) -> tuple[complex, complex] | None:
-        """The complex pair of multipliers that crosses: its members at a and b."""
-        outside, inside = (a, b) if a.unstable > b.unstable else (b, a)
-        candidates = [mu for mu in _pairs(outside) if abs(mu) > 1.0]
-        partners = [mu for mu in _pairs(inside) if abs(mu) <= 1.0]
-        if not (candidates and partners):
-            return None
-        out, partner = min(product(candidates, partners), key=lambda pair: abs(pair[0] - pair[1]))
-        with np.errstate(divide="ignore"):
-            products = [float(np.log(np.abs(sample.floquet.multipliers)).sum()) for sample in (a, b)]
-        if max(map(abs, products)) < UNDAMPED:
-            # pairs stay on the circle and rounding alone carries them across; one point alone may lie where a pair does
-            return None
-        return (complex(out), complex(partner)) if outside is a else (complex(partner), complex(out))
+    def crossing(a: Sample, b: Sample) -> tuple[complex, complex] | None:
+        """The complex pair of multipliers that crosses the circle: its members at a and b."""
+        kinds = _passing_one(a, b)
+        real = sum(kind.multiplicity for kind in kinds)
+        # one multiplier passes +1 at a limit point or a branch point, or at both in one
+        real -= BRANCH_POINT in kinds and LIMIT_POINT in kinds
+        return crossing_pair(a.floquet.multipliers, b.floquet.multipliers, b.unstable - a.unstable, real)
 
     @staticmethod
     def of_its_sort(sample: Sample) -> ComplexArray:
-        return np.array(_pairs(sample), dtype=complex)
+        return upper(sample.floquet.multipliers)
 
     def fraction(self, a: Sample, b: Sample) -> float:
-        pair = self._pair(a, b)
+        pair = self.crossing(a, b)
         return 0.5 if pair is None else _zero(abs(pair[0]) - 1.0, abs(pair[1]) - 1.0)
 
     def kappa(self, sample: Sample) -> float:
         """From the complex multiplier closest to the unit circle: `mu = exp(i kappa T)`."""
-        pairs = _pairs(sample)
-        if not pairs:
+        pairs = upper(sample.floquet.multipliers)
+        if not len(pairs):
             raise ConvergenceError("no complex pair of multipliers here")
         mu = min(pairs, key=lambda m: abs(abs(m) - 1.0))
         return float(np.angle(mu)) * sample.state.rate / (2.0 * np.pi)
@@ -265,19 +254,21 @@ def changes(a: Sample, b: Sample) -> tuple[BifurcationKind, ...]:
     # several ask this of the same two
     if b.compared is not None and b.compared[0]() is a:
         return b.compared[1]
+    kinds = _passing_one(a, b)
+    if NEIMARK_SACKER.crossing(a, b) is not None:
+        kinds.append(multiple(NEIMARK_SACKER, len(_together(NEIMARK_SACKER, a, b)[0])))
+    b.compared = weakref.ref(a), tuple(kinds)
+    return b.compared[1]
+
+
+def _passing_one(a: Sample, b: Sample) -> list[BifurcationKind]:
+    """The kinds, NS left out, whose tests have changed between two neighbours."""
     kinds: list[BifurcationKind] = []
     for kind in ALL_KINDS[:3]:
         several = len(_together(kind, a, b)[0])
         if several or kind.changed(a, b):
             kinds.append(multiple(kind, several))
-    # one multiplier passes +1 at a limit point or a branch point, or at both in one
-    accounted = sum(kind.multiplicity for kind in kinds)
-    accounted -= len(kinds) > 1 and kinds[0] is BRANCH_POINT and kinds[1] is LIMIT_POINT
-    if NEIMARK_SACKER.beyond(a, b, accounted):
-        several = len(_together(NEIMARK_SACKER, a, b)[0])
-        kinds.append(multiple(NEIMARK_SACKER, several))
-    b.compared = weakref.ref(a), tuple(kinds)
-    return b.compared[1]
+    return kinds
 
 
 def _together(kind: BifurcationKind, a: Sample, b: Sample) -> tuple[Array, Array]:
@@ -311,11 +302,6 @@ def _zero(a: float, b: float) -> float:
     if a * b >= 0.0 or not np.isfinite(a * b):
         return 0.5
     return min(0.98, max(0.02, a / (a - b)))
-
-
-def _pairs(sample: Sample) -> list[complex]:
-    """The complex multipliers of the upper half plane."""
-    return [mu for mu in sample.floquet.multipliers if mu.imag > 1e-9 * abs(mu)]
 
 
 def _real(sample: Sample) -> ComplexArray:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -22,7 +22,7 @@ from suboctave.continuation.linear import Factor, length
 from suboctave.continuation.newton import NewtonOptions, correct, null_row
 from suboctave.continuation.point import CurvePoint, make_point, point_between, solved_again
 from suboctave.continuation.problem import Array
-from suboctave.curves.interior import Interior, Steps, unsettled
+from suboctave.curves.interior import Interior, Steps, contacts_between, unsettled
 from suboctave.curves.kinds.extremum import LimitPointExtremal
 from suboctave.curves.kinds.grazing import GrazingEquations
 from suboctave.curves.kinds.limit_cycle import LimitCycle
@@ -31,9 +31,10 @@ from suboctave.curves.motion import MotionProblem
 from suboctave.curves.other_branch import crossing_point
 from suboctave.curves.sample import Sample
 from suboctave.curves.trace import joined
-from suboctave.curves.tracked.tests import CurvesCross, CurveTest, Cusp, Extremum
+from suboctave.curves.tracked.tests import CurvesCross, CurveTest, Cusp, Extremum, PairCrossing
 from suboctave.errors import ConvergenceError
 from suboctave.floquet.methods import StabilityMethod
+from suboctave.floquet.symmetric import least_factor
 from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.truncation import choose_harmonics
 
@@ -147,6 +148,8 @@ SAME = 5e-3
 _RESOLVED, _ROUGH = 1e-11, 1e-3
 #: share of a test's values at the ends of a step above which one that has been resolved jumps instead of vanishing
 _JUMP = 0.5
+#: halvings of the way to a grazing from either side that show whether it does
+_CLOSER = 4
 
 
 @dataclass(frozen=True)
@@ -214,9 +217,15 @@ def located(test: CurveTest, low: Sample, high: Sample, newton: NewtonOptions) -
     bracket = Bracket(same.point, high.point, (first, last), lambda point: own.value(Sample(point)), newton)
     # whether curves cross is known at the crossing itself
     precisely = isinstance(own, CurvesCross)
-    share, little = bracket.zero(_RESOLVED if precisely else _ROUGH), _JUMP * min(abs(first), abs(last))
+    little = _JUMP * min(abs(first), abs(last))
     # on a curve of extrema those that others bring about are known by their distance; multipliers tell only close by
     apart = high.curve.augmentation.turning or type(own).genuine is not CurveTest.genuine or isinstance(own, Extremum)
+    try:
+        share = bracket.zero(_RESOLVED if precisely else _ROUGH)
+    except ConvergenceError:
+        if apart or not _jumps(bracket, little):
+            raise
+        return None
     if not apart and abs(bracket.values[share]) > little:
         share = bracket.zero(_RESOLVED)
         if abs(bracket.values[share]) > little:
@@ -236,6 +245,26 @@ def located(test: CurveTest, low: Sample, high: Sample, newton: NewtonOptions) -
     return LocatedEvent(
         own, sample, own.extreme(first or -slope, sample), bracket if finer else None, slope, ends=(same, high)
     )
+
+
+def _jumps(bracket: Bracket, little: float) -> bool:
+    """Whether a function jumps to the other sign where a contact grazes: on the way there from either side, as far as
+    points are found, it keeps its sign and stays larger than a little.
+    """
+    values, ends = bracket.values, [0.0, 1.0]
+    for low, high in itertools.pairwise(sorted(values)):
+        if values[low] * values[high] <= 0.0:
+            ends = [low, high]
+    for side, _ in itertools.product((0, 1), range(_CLOSER)):
+        grazes = contacts_between(*(Sample(bracket.points[share]) for share in ends)).grazes
+        if grazes is None:
+            return False
+        share = 0.5 * (ends[side] + ends[0] + grazes * (ends[1] - ends[0]))
+        with suppress(ConvergenceError):
+            if bracket.value(share) * values[ends[side]] <= 0.0:
+                return False
+            ends[side] = share
+    return 0.0 < ends[0] < ends[1] < 1.0 and min(abs(values[share]) for share in ends) > little
 
 
 def _turned(test: CurveTest, a: Sample, b: Sample) -> LocatedEvent | None:
@@ -482,6 +511,11 @@ class _Step(Interior):
 
     def measures(self, sample: Sample) -> Array:
         return self.steps.functions(sample)
+
+    def relative(self, stencil: Sequence[Sample], k: int) -> Iterator[Array]:
+        """See `Interior.relative`: with the least factor of `torus`."""
+        if isinstance(self.steps.tests[k], PairCrossing):
+            yield np.array([least_factor(sample.others) for sample in stencil])
 
     def solve(self, fraction: float) -> Sample:
         return Sample(point_between(self.old.point, self.new.point, fraction, self.steps.newton))

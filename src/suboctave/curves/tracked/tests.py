@@ -25,11 +25,11 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from itertools import product
 
 import numpy as np
 
 from suboctave.bifurcation.bordered import NullVectors, bordered, null_vectors, transversality
+from suboctave.bifurcation.measures import crossing_pair
 from suboctave.continuation.linear import length
 from suboctave.continuation.point import crossing_matrix
 from suboctave.curves.kinds.free_phase import FreePhaseOperator
@@ -39,7 +39,7 @@ from suboctave.curves.kinds.singular import SingularOperator
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.sample import Sample
 from suboctave.errors import ConvergenceError
-from suboctave.floquet.symmetric import UNDAMPED, symmetric_functions
+from suboctave.floquet.symmetric import symmetric_functions
 from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.perturbation import Kind
 from suboctave.kinds import MOTION_KINDS
@@ -446,19 +446,7 @@ def _nearest_pair(sample: Sample, target: complex) -> complex:
 def _passing(first: ComplexArray, last: ComplexArray) -> tuple[complex, complex] | None:
     """The complex pair that passes the unit circle between two sets of multipliers, by its upper members."""
     a, b = _census(first), _census(last)
-    if abs(a[0] - b[0]) < 2 + abs(a[1] - b[1]) + abs(a[2] - b[2]):
-        return None
-    outside, inside = (first, last) if a[0] > b[0] else (last, first)
-    with np.errstate(divide="ignore"):
-        if abs(float(np.log(np.abs(outside)).sum())) < UNDAMPED:
-            # pairs stay on the circle and rounding alone carries them across
-            return None
-    leaving = outside[(outside.imag > 0.0) & (np.abs(outside) > 1.0)]
-    staying = inside[(inside.imag > 0.0) & (np.abs(inside) <= 1.0)]
-    if not (leaving.size and staying.size):
-        return None
-    out, partner = min(product(leaving, staying), key=lambda pair: abs(pair[0] - pair[1]))
-    return complex(out), complex(partner)
+    return crossing_pair(first, last, b[0] - a[0], abs(a[1] - b[1]) + abs(a[2] - b[2]))
 
 
 def _census(mu: ComplexArray) -> tuple[int, int, int]:
@@ -475,7 +463,10 @@ class Doubling(RealCrossing):
     operator: Kind = Kind.HALF
 
     def smooth(self, sample: Sample) -> tuple[float, float]:
-        # what more harmonics do to a determinant is no matter of the motion
+        if sample.half_wave:
+            return 1.0, 0.0
+        # no matter of the motion are what more harmonics do to a determinant, and its poles at resonances of what is
+        # eliminated
         sign, size = symmetric_functions(sample.others)[:, 1].tolist()
         return sign, size
 
@@ -529,12 +520,7 @@ def tests_of(curve: MotionProblem) -> tuple[CurveTest, ...]:
         if isinstance(own, FreePhaseOperator):
             return turns + (_OF_MODES if own.conservative else _OF_CYCLES[own.kind])
         if isinstance(own, NonlinearMode):
-            # the determinant of J_half costs less than multipliers, which nothing else asks for at every point
-            return (
-                *turns,
-                CurvesCross(),
-                *((ActionTurns(), RealCrossing("PD", Kind.HALF)) if own.conservative else ()),
-            )
+            return (*turns, CurvesCross(), *((ActionTurns(), Doubling()) if own.conservative else ()))
         return (*turns[:-1], TurningPoint(curve.name), CurvesCross(), *_CROSSINGS)
     if own.name in MOTION_KINDS:
         peaks = (PeakTurns(),) if isinstance(own, Ridge) else ()

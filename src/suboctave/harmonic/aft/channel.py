@@ -25,6 +25,8 @@ from suboctave.lazy import lazy
 __all__ = ["Channel", "Group", "laws_along"]
 
 _NO_SPECTRUM = np.zeros(0, dtype=complex)
+#: odd Fourier coefficients of stiffness and damping, as a share of the largest, that are rounding
+_ROUNDING = 1e-8
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +90,12 @@ class Channel:
     def damping(self, i: int) -> ComplexArray:
         """Fourier coefficients of f_vi, empty for laws without velocity."""
         return self.spectra[1 + self.count + i] if self.moving else _NO_SPECTRUM
+
+    @lazy
+    def half_wave(self) -> bool:
+        """Whether stiffness and damping are the same in both halves of the period."""
+        derivatives = np.abs(self.spectra[1:])
+        return bool(derivatives[:, 1::2].max(initial=0.0) <= _ROUNDING * derivatives.max(initial=0.0))
 
     @lazy
     def second(self) -> list[Second]:
