@@ -20,6 +20,7 @@ import scipy.linalg
 from suboctave.analysis.options import Inherited
 from suboctave.bifurcation.bifurcation import Bifurcation, TrackedEvent
 from suboctave.continuation.linear import length, one_thread
+from suboctave.curves.kinds.multiple import MultipleEquations
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.tracked.start import curve_through, is_extremum, on_free_phase, with_extremum
 from suboctave.errors import InputError, shortened, suggest
@@ -33,6 +34,8 @@ if TYPE_CHECKING:
 _STEP = 1e-5
 #: unfolding of a branch point by a parameter, in units of the motion's forces, that is rounding
 _UNFOLDED = 1e-9
+#: share of the way of bifurcations that fall together by which a parameter parts them, up to which it is rounding
+_PARTED = 1e-6
 
 
 @dataclass(frozen=True, repr=False)
@@ -119,16 +122,13 @@ def sensitivity(bifurcation: Bifurcation, parameters: Sequence[str] | None = Non
     free, held = _names(bifurcation, parameters)
     with one_thread():
         curve, u, moved = _moving(bifurcation, held)
-        n, first = curve.balance.dimension, len(moved) - len(free)
+        first = len(moved) - len(free)
         amplitude = _Amplitude(bifurcation, curve, u)
         derivatives = {}
         for column, name in zip(moved.T, held, strict=True):
             along = np.concatenate((column, [float(name == other) for other in held]))
             rates = dict(zip(free, column[first:].tolist(), strict=True)) | {"amplitude": amplitude.along(along)}
-            if (
-                bifurcation.kind == "BP"
-                and np.abs(column[n:first]).max() * curve.spans[curve.names.index(name)] > _UNFOLDED
-            ):
+            if _broken(bifurcation, curve, u, along, name):
                 rates = dict.fromkeys(rates, float("nan"))
             derivatives[name] = rates
     # the one that an extremum is of comes first
@@ -147,6 +147,15 @@ def _moving(item: Bifurcation, held: Sequence[str]) -> tuple[MotionProblem, Arra
         curve = with_extremum(curve, u, item.parameter_name)
     jacobian, own = curve.evaluate(u).jacobian, len(u) - len(held)
     return curve, u, scipy.linalg.solve(jacobian[:, :own], -jacobian[:, own:])
+
+
+def _broken(item: Bifurcation, curve: MotionProblem, u: Array, along: Array, name: str) -> bool:
+    """Whether a parameter breaks the symmetry that forces a branch point, or bifurcations to fall together."""
+    n, span = curve.balance.dimension, curve.spans[curve.names.index(name)]
+    if item.kind == "BP" and np.abs(along[n : -len(curve.names)]).max() * span > _UNFOLDED:
+        return True
+    equations = curve.evaluate(u).equations.own
+    return isinstance(equations, MultipleEquations) and equations.parting(along) * span > _PARTED * curve.spans[0]
 
 
 def foretold(item: TrackedEvent, changes: Mapping[str, float]) -> TrackedEvent:

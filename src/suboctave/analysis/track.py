@@ -68,6 +68,8 @@ Range = tuple[float, float]
 
 #: a curve of bifurcations is drawn by its points, and those in its turns cost little
 _STEPPING = SteppingOptions(angle=0.15, growth=4.0)
+#: what a curve of multiple bifurcations says
+_MULTIPLE = "along multiple bifurcations extrema are located, but points of codimension two are not looked for"
 
 
 @with_options(TrackOptions)
@@ -119,7 +121,8 @@ def track(
     TrackedBranch
         With `extrema` (where either parameter turns) and, in `bifurcations`, points of codimension two as well: CP
         (cusp), GPD (generalised period doubling), R1, R2, R3, R4 (resonances), LPPD, LPNS, PDNS, NSNS (fold-flip,
-        fold-, flip- and double Neimark-Sacker).
+        fold-, flip- and double Neimark-Sacker). Along multiple bifurcations, those of symmetric systems that fall
+        together, extrema only.
 
     Raises
     ------
@@ -147,6 +150,8 @@ def track(
             start = aside(start, ranges, settings.newton)
         first, last = given[names[-1]]
         trace = _both_ways(start, ranges, math.copysign(1.0, last - first), settings)
+    if item.multiplicity > 1:
+        trace.warnings.append(_MULTIPLE)
     kept = options_of(settings, wanted, given)
     return _branch(item, names, turning, trace, settings, kept)
 

@@ -78,6 +78,9 @@ class Augmentation(ABC):
     #: whether the equations read the observed degree of freedom, which is an unknown then
     reads_observed: bool = False
 
+    #: how many bifurcations of the kind fall together at a solution
+    multiplicity: int = 1
+
     @property
     @abstractmethod
     def name(self) -> str:

@@ -241,7 +241,7 @@ class GuardedStep(Interior):
         return found is not None
 
     def relative(self, stencil: Sequence[Sample], k: int) -> Iterator[Array]:
-        """See `Interior.relative`: with the functions of multipliers in rings, where some are alike of one for each, then
+        """See `Interior.relative`: with the functions of multipliers in rings, of equal ones with one, then
         of those that elements move.
         """
         known = [s.floquet.multipliers for s in stencil]

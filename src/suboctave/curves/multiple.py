@@ -34,8 +34,8 @@ from suboctave.floquet.monodromy import floquet_multipliers
 from suboctave.harmonic.basis import Array
 from suboctave.harmonic.perturbation import Kind
 
-#: distances from the bifurcation, in scaled arclength, at which branches are looked for: close to it all directions look
-#: alike where their symmetry tells them apart in terms of high order only
+#: distances from the bifurcation, in scaled arclength, at which branches are looked for: close to it all directions are
+#: alike where terms of high order alone tell them apart
 _DISTANCES = (0.3, 0.1, 0.03, 0.01)
 _NEWTON = NewtonOptions(tolerance=1e-13, correction=1e-9, iterations=15, longest=0.1, rounding=True)
 #: how far the branch that passes there may lie from the bifurcation, in units of that distance

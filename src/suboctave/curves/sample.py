@@ -23,6 +23,7 @@ from suboctave.curves.kinds.branch_point import BranchPointEquations
 from suboctave.curves.kinds.extremum import ExtremalEquations
 from suboctave.curves.kinds.free_phase import FreePhaseEquations, FreePhaseOperator
 from suboctave.curves.kinds.grazing import GrazingEquations
+from suboctave.curves.kinds.multiple import MultipleEquations
 from suboctave.curves.kinds.nonlinear_mode import ModeEquations
 from suboctave.curves.kinds.singular import SingularEquations, SingularOperator
 from suboctave.curves.motion import MotionEvaluation, MotionProblem
@@ -188,7 +189,7 @@ class Sample:
     def kappa(self) -> float:
         """Frequency of the critical perturbation at an NS, else 0."""
         equations = self.evaluation.equations.own
-        return equations.kappa if isinstance(equations, SingularEquations) else 0.0
+        return equations.kappa if isinstance(equations, SingularEquations | MultipleEquations) else 0.0
 
     @property
     def instant_or_frequency(self) -> float:

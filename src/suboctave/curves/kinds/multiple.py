@@ -24,24 +24,26 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import polar
 
+from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.bifurcation.bordered import NullVectors, weighted_operator
 from suboctave.continuation.linear import Factor
 from suboctave.curves.augmentation import Augmentation, Equations
-from suboctave.harmonic.basis import Array, ComplexArray
+from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.perturbation import Gradient, Kind, bilinear_gradient
 from suboctave.harmonic.truncation import motion_size
 from suboctave.lazy import lazy
 
 _NAMES = {Kind.INTEGER: "BP", Kind.HALF: "PD", Kind.FREE: "NS"}
+OPERATORS = {name: kind for kind, name in _NAMES.items()}
 
 
 @dataclass(frozen=True)
 class MultiplePoint(Augmentation):
     """tr G of J_0 (Kind.INTEGER), J_half (Kind.HALF) or J_kappa (Kind.FREE) is zero.
 
-    `left`, `right`: B and C, unit columns (N, m) in mass weights; `reference`: X_0 there, (dimension,); `unit`: of G,
-    omega^2; `force`: of the unfolding.
+    `left`, `right`: B and C, `multiplicity` unit columns each, (N, m), in mass weights; `reference`: X_0 there,
+    (dimension,); `unit`: of G, omega^2; `force`: of the unfolding.
     """
 
     kind: Kind
@@ -50,6 +52,7 @@ class MultiplePoint(Augmentation):
     reference: Array
     unit: float
     force: float
+    multiplicity: int = 2
 
     @classmethod
     def of(cls, state: BalanceState, kind: Kind, multiplicity: int, name: str, kappa: float = 0.0) -> MultiplePoint:
@@ -61,20 +64,22 @@ class MultiplePoint(Augmentation):
         u, _, vh = np.linalg.svd(matrix)
         left, right = u[:, -multiplicity:], vh[-multiplicity:].conj().T
         reference = state.unknowns / scale if kind is Kind.INTEGER else np.zeros(0)
-        own = cls(kind, left, right, reference, state.omega**2, state.balanced.scale or state.omega**2)
+        force = state.balanced.scale or state.omega**2
+        own = cls(kind, left, right, reference, state.omega**2, force, multiplicity)
         extra = np.array([kappa]) if kind is Kind.FREE else np.zeros(own.extras)
         turn, _ = polar(own.at(state, extra, (name,)).change)
         return replace(own, left=left @ turn)
+
+    @classmethod
+    def through(cls, item: Bifurcation, state: BalanceState, names: tuple[str, ...]) -> tuple[MultiplePoint, Array]:
+        """See `Augmentation.through`."""
+        own = cls.of(state, OPERATORS[item.kind], item.multiplicity, names[0], item.kappa)
+        return own, np.full(own.extras, item.kappa)
 
     @property
     def name(self) -> str:
         """Kind of bifurcation."""
         return _NAMES[self.kind]
-
-    @property
-    def multiplicity(self) -> int:
-        """m."""
-        return self.left.shape[1]
 
     @property
     def extras(self) -> int:
@@ -89,6 +94,16 @@ class MultiplePoint(Augmentation):
     def spans(self, rate: float) -> Array:
         """kappa in units of the base frequency."""
         return np.full(self.extras, rate if self.kind is Kind.FREE else 1.0)
+
+    def resized(self, basis: HarmonicBasis, size: int) -> MultiplePoint:
+        pairs = [NullVectors(*pair) for pair in zip(self.right.T, self.left.T, strict=True)]
+        pairs = [pair.resized(basis, size, self.kind) for pair in pairs]
+        # harmonics in ascending order; border vectors have no others
+        reference = np.zeros(len(pairs[0].right) if self.reference.size else 0)
+        kept = min(len(reference), len(self.reference))
+        reference[:kept] = self.reference[:kept]
+        right, left = (np.column_stack([getattr(pair, side) for pair in pairs]) for side in ("right", "left"))
+        return replace(self, right=right, left=left, reference=reference)
 
     def unfolding(self, extra: Array) -> float:
         return float(np.abs(extra).max()) if self.kind is Kind.INTEGER else 0.0
@@ -106,7 +121,7 @@ class MultipleEquations(Equations):
         self.unfolds = of.kind is Kind.INTEGER
         self.scale = state.balance.row_weights(len(of.left))
         if self.unfolds:
-            self.columns: Array = of.force * of.left / self.scale[:, None]
+            self.columns: Array = np.real(of.force * of.left / self.scale[:, None])
             self.addition = self.columns @ extra
 
     @lazy
@@ -130,7 +145,7 @@ class MultipleEquations(Equations):
     def _motion(self) -> Array:
         """How far the motion lies from X_0 along the null vectors, in units of its size, (m,)."""
         here = self.state.unknowns / self.scale - self.of.reference
-        return np.asarray(self.of.right.T @ here) / (motion_size(self.state) or 1.0)
+        return np.real(self.of.right.T @ here) / (motion_size(self.state) or 1.0)
 
     @lazy
     def values(self) -> Array:
@@ -141,7 +156,7 @@ class MultipleEquations(Equations):
 
     @lazy
     def _gradients(self) -> list[list[Gradient]]:
-        """Derivatives of -G, in units of omega^2, by the coefficients, by the free parameters, by kappa: G_ij at i, j."""
+        """Derivatives of -G, in units of omega^2, by the coefficients, by the free parameters, by kappa; [i][j]."""
         right, left, _ = self.solved
         vectors = [one.T * self.scale / math.sqrt(self.of.unit) for one in (left, right)]
         state, kind = self.state, self.of.kind
@@ -204,6 +219,21 @@ class MultipleEquations(Equations):
         way = float(np.hypot(np.linalg.norm(weights[:-1] * self._move), weights[-1]))
         spread = float(np.linalg.norm(self.solved[2], 2))
         return spread * way / abs(change) if change else np.inf
+
+    def parting(self, way: Array) -> float:
+        """How fast eigenvalues of G part along a way of the unknowns, in units of how fast they change together along
+        the branch with the first free parameter.
+        """
+        n, last = self.state.x.size, way[-len(self.names) :]
+        turning = float(way[n]) if self.of.kind is Kind.FREE else 0.0
+
+        def slope(one: Gradient) -> complex:
+            by_names = sum(one.rates[name] * part for name, part in zip(self.names, last, strict=True))
+            return complex(one.x.ravel() @ way[:n] + by_names + one.kappa * turning)
+
+        change, m = np.array([[slope(one) for one in row] for row in self._gradients]), self.of.multiplicity
+        rest = change - np.trace(change) / m * np.eye(m)
+        return float(np.linalg.norm(rest, 2)) * m / abs(np.trace(self.change))
 
     def vectors(self, mixed: Array) -> NullVectors:
         """The null vectors that combine V and U by the coefficients `mixed`, (m,)."""

@@ -388,6 +388,7 @@ def as_event(event: LocatedEvent, method: StabilityMethod, observe: int) -> Trac
         names=curve.names,
         extreme=event.extreme,
         contact=_contact(sample),
+        multiplicity=curve.augmentation.own.multiplicity,
         isola=_isola(event),
         turning=curve.augmentation.turning,
     )

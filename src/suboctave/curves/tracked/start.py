@@ -18,6 +18,7 @@ from suboctave.curves.events.formulation import BORDERED, Formulation
 from suboctave.curves.kinds.extremum import BorderedExtremal, LimitPointExtremal
 from suboctave.curves.kinds.free_phase import FreePhaseOperator
 from suboctave.curves.kinds.mode_event import MODE_EVENTS
+from suboctave.curves.kinds.multiple import MultiplePoint
 from suboctave.curves.kinds.nonlinear_mode import NonlinearMode, of_modes
 from suboctave.curves.kinds.singular import SingularOperator
 from suboctave.curves.motion import MotionProblem
@@ -64,6 +65,13 @@ def on_mode(item: Bifurcation) -> bool:
 
 def _equations(item: Bifurcation, names: tuple[str, ...], formulation: Formulation) -> type[Augmentation]:
     """Those of the curve through a located point; InputError where it has none."""
+    if item.multiplicity > 1 and is_extremum(item):
+        raise InputError(
+            f"this extremum lies on a curve of multiple {item.curve}: extrema along these are not followed in another "
+            "parameter"
+        )
+    if item.multiplicity > 1:
+        return MultiplePoint
     if on_free_phase(item) or (of_modes(item) and kind_of(item) == "PD"):
         return FreePhaseOperator
     if on_mode(item) and len(names) == 2:
