@@ -263,3 +263,39 @@ def test_extrema_along_their_curves_are_the_last(in_phase):
     extremum = replace(extremum, extreme="maximum", multiplicity=2)
     with pytest.raises(InputError, match="multiple BP"):
         curve_through(extremum, item.orbit.basis, ("omega", "p"))
+
+
+def van_der_pol(n):
+    """A ring, coupled by springs and dampers: Hopf points where mu is what the dampers take."""
+    damping = {"1": 0.05 * coupling(n, every=False), "mu": -np.eye(n)}
+    stiffness = np.eye(n) + 0.1 * coupling(n, every=False)
+    return so.System(np.eye(n), damping, stiffness, [so.Expression(i, "x**2*v") for i in range(n)], [], {"mu": -0.5})
+
+
+def test_hopf_points_of_a_ring_and_its_rotating_waves():
+    branch = so.equilibria(van_der_pol(3), "mu", (-0.3, 0.4))
+    simple, *double = branch.bifurcations["Hopf"]
+    assert [event.multiplicity for event in (simple, *double)] == [1, 2, 2]
+    for event in double:
+        assert event.parameters["mu"] == pytest.approx(0.15, abs=1e-12)
+        assert event.omega == pytest.approx(np.sqrt(1.3), rel=1e-10)
+    senses = []
+    for event in double:
+        cycles = so.limit_cycles(event, harmonics=5)
+        assert [end.kind for end in cycles.bifurcations] == ["Hopf"]
+        orbit = cycles.orbits[-1]
+        # every oscillator does what its neighbour did a third of a period before
+        waves = orbit.x[1] - 1j * orbit.x[2]
+        turns = np.angle(waves[1:] / waves[:-1]) * 3.0 / (2.0 * np.pi)
+        assert np.allclose(np.abs(turns), 1.0, atol=1e-6)
+        senses.append(np.sign(turns[0]))
+        assert so.verify(orbit).agrees
+    assert sorted(senses) == [-1.0, 1.0]
+
+
+def test_hopf_points_whose_cycles_cannot_be_told_apart():
+    # of four oscillators neighbours do not meet in the third power of the amplitude: any phase between them will do
+    branch = so.equilibria(van_der_pol(4), "mu", (-0.05, 0.15))
+    event = next(event for event in branch.bifurcations if event.multiplicity == 2)
+    with pytest.raises(ConvergenceError, match="2 Hopf points fall together"):
+        so.limit_cycles(event, harmonics=5)

@@ -6,6 +6,8 @@ import math
 from dataclasses import replace
 from typing import Any, Unpack
 
+import numpy as np
+
 from suboctave.analysis.equilibria import check_undriven
 from suboctave.analysis.options import Inherited, TrackOptions
 from suboctave.analysis.track import track
@@ -13,15 +15,19 @@ from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.continuation.linear import length
 from suboctave.continuation.newton import NewtonOptions, correct
 from suboctave.curves.hopf import shape_of
+from suboctave.curves.kinds.multiple import MultiplePoint
 from suboctave.curves.motion import MotionEvaluation
+from suboctave.curves.multiple import independent
 from suboctave.curves.starts import linear_up_to, own_linear_part, rule_of
 from suboctave.curves.trace import BranchPoint
 from suboctave.curves.tracked.start import curve_through
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.floquet.methods import Monodromy
-from suboctave.harmonic.basis import Array, HarmonicBasis
+from suboctave.floquet.monodromy import floquet_multipliers
+from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis
 from suboctave.harmonic.evaluation import BalanceState, HarmonicBalance
 from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.harmonic.perturbation import Kind
 from suboctave.harmonic.truncation import AdaptiveHarmonics
 from suboctave.model.inputs import check_bounds, check_parameter, timed
 from suboctave.options import with_options
@@ -36,6 +42,11 @@ _STILL = 1e-8
 _SIZES = (1.0, 0.3, 0.1, 0.03)
 #: change of the frequency, as a share, up to which it is the oscillation that begins there
 _SAME = 0.3
+#: starts for each of several Hopf points that fall together; cosine of two waves beyond which they are one
+_STARTS, _ONE = 12, 0.999
+#: how far the second multiplier of a cycle there lies from +1, at least, as a share of the last of those that the Hopf
+#: points have there. Of standing waves it is a power of the amplitude, so that nothing tells small ones apart
+_TOLD = 0.2
 
 
 @with_options(TrackOptions)
@@ -58,7 +69,8 @@ def limit_cycles(
     Parameters
     ----------
     start
-        A "Hopf" of `equilibria`; or a motion near a cycle: an orbit, a point of a branch.
+        A "Hopf" of `equilibria`; or a motion near a cycle: an orbit, a point of a branch. From Hopf points that fall
+        together, those of equal oscillators, rotating waves as a rule, from each another one.
     bounds
         Range of the parameter (from, to); from a Hopf point default that of its equilibria.
     parameter
@@ -111,7 +123,8 @@ def limit_cycles(
         bounds = Inherited(item).bounds(parameter)
     ends = check_bounds(orbit.system, parameter, bounds)
     if hopf is not None:
-        orbit = _first_cycle(hopf, parameter, ends, harmonics)
+        begins = _first_cycle if hopf.multiplicity == 1 else _one_of_several
+        orbit = begins(hopf, parameter, ends, harmonics)
     # multipliers are computed when asked for
     motion = BranchPoint(orbit, None, 0.0, 0, Monodromy())
     return track(motion, parameter, ends, omega=omega, onto="limit_cycle", harmonics=harmonics, **options)
@@ -164,6 +177,46 @@ def _first_cycle(hopf: Bifurcation, name: str, ends: tuple[float, float], harmon
     raise ConvergenceError(
         f"no limit cycle was found beside the Hopf point at {name} = {hopf.parameter(name):.6g}: {reason}"
     )
+
+
+def _one_of_several(hopf: Bifurcation, name: str, ends: tuple[float, float], harmonics: Any) -> PeriodicOrbit:
+    """A small cycle beside one of the Hopf points that fall together, from each another if there are as many, looked
+    for from starts all over the null space; ConvergenceError if none is found that is told from others.
+    """
+    state, m = hopf.orbit.state(), hopf.multiplicity
+    own = MultiplePoint.of(state, Kind.FREE, m, name, hopf.kappa)
+    equations = own.at(state, np.array([hopf.kappa]), (name,))
+    basis, size = equations.solved[0], state.balance.size
+    middle, scale = slice(size, 2 * size), equations.scale[size : 2 * size]
+    which = int(np.argmax(np.abs(hopf.null_vectors.right.conj() @ basis)))
+    found: list[tuple[float, Array | ComplexArray]] = []
+    cycles: list[PeriodicOrbit] = []
+    failure = None
+    for start in np.random.default_rng(0).normal(size=(_STARTS * m, m, 2)) @ np.array([1.0, 1.0j]):
+        try:
+            vectors = equations.vectors(start / np.linalg.norm(start))
+            cycle = _first_cycle(replace(hopf, null_vectors=vectors), name, ends, harmonics)
+        except ConvergenceError as cause:
+            failure = cause
+            continue
+        away = np.sort(np.abs(floquet_multipliers(cycle.state()).multipliers - 1.0))
+        if away[1] < _TOLD * away[2 * m - 1]:
+            continue
+        wave = (cycle.x[1] - 1j * cycle.x[2]) / scale
+        mix = np.asarray(np.linalg.lstsq(basis[middle], wave, rcond=None)[0])
+        mix = mix / np.linalg.norm(mix)
+        if all(abs(np.vdot(mix, other)) < _ONE for _, other in found):
+            found.append((float(cycle.values[name] - hopf.parameter(name)) / float(np.vdot(wave, wave).real), mix))
+            cycles.append(cycle)
+    if not cycles:
+        raise ConvergenceError(
+            f"{m} Hopf points fall together at {name} = {hopf.parameter(name):.6g}, and no cycle beside them can be "
+            "told from others as small as it: begin at a larger one, an orbit that integrate comes to"
+        ) from failure
+    chosen = independent(found, m)
+    # with fewer cycles than Hopf points some share one
+    places = [i for mix in chosen for i, (_, other) in enumerate(found) if mix is other]
+    return cycles[places[min(which, len(places) - 1)]]
 
 
 def _noticed(state: BalanceState, shape: Array, name: str, aside: float) -> float:

@@ -12,7 +12,7 @@ for again along its own direction, there and half as far, which foretells the di
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
@@ -31,7 +31,7 @@ from suboctave.curves.refine import bifurcation_at
 from suboctave.curves.sample import Sample
 from suboctave.errors import ConvergenceError
 from suboctave.floquet.monodromy import floquet_multipliers
-from suboctave.harmonic.basis import Array
+from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.perturbation import Kind
 
 #: distances from the bifurcation, in scaled arclength, at which branches are looked for: close to it all directions are
@@ -67,7 +67,7 @@ def multiple_at(located: Located, a: Sample, b: Sample, observe: int, warnings: 
     return [replace(item, multiplicity=m, null_vectors=equations.vectors(one)) for one in mixed]
 
 
-def _leaving(item: Bifurcation, equations: MultipleEquations, curve: MotionProblem) -> list[Array]:
+def _leaving(item: Bifurcation, equations: MultipleEquations, curve: MotionProblem) -> list[Array | ComplexArray]:
     """Unit combinations, (m,), of the null vectors along which branches leave: independent ones, of different sorts
     first, and where there are too few any that complete them.
     """
@@ -89,7 +89,7 @@ def _leaving(item: Bifurcation, equations: MultipleEquations, curve: MotionProbl
                 found += _toward(curve, u, weights, ways, start, distance, [mix for _, mix in found])
         if len(found) >= len(ways):
             break
-    return _independent(found, len(ways))
+    return independent(found, len(ways))
 
 
 def _toward(
@@ -113,7 +113,7 @@ def branch_beside(curve: MotionProblem, u: Array, weights: Array, way: Array, di
     """
     there = correct(curve, u + distance * way, weights * way, weights, _NEWTON).u - u
     if length(weights * there) > _FAR * distance:
-        raise ConvergenceError("what was found is no branch that leaves there")
+        raise ConvergenceError("what was found lies elsewhere")
     return np.asarray(there)
 
 
@@ -159,9 +159,12 @@ def _starts(m: int) -> Iterator[Array]:
     yield from random / np.linalg.norm(random, axis=1)[:, None]
 
 
-def _independent(found: list[tuple[float, Array]], m: int) -> list[Array]:
-    """m independent directions of those found, one of each sort first, completed where there are too few."""
-    sorts: list[list[Array]] = []
+def independent(found: Sequence[tuple[float, Array | ComplexArray]], m: int) -> list[Array | ComplexArray]:
+    """m independent directions of those found, one of each sort first, completed where there are too few.
+
+    found: how far the parameter moves along each, which tells sorts apart, and unit vectors (m,), real or complex.
+    """
+    sorts: list[list[Array | ComplexArray]] = []
     moves: list[float] = []
     for moved, mix in sorted(found, key=lambda entry: -abs(entry[0])):
         alike = next((i for i, other in enumerate(moves) if abs(abs(other) - abs(moved)) <= _ALIKE * abs(other)), None)
@@ -171,11 +174,12 @@ def _independent(found: list[tuple[float, Array]], m: int) -> list[Array]:
         else:
             sorts[alike].append(mix)
     order = [sort[0] for sort in sorts] + [mix for sort in sorts for mix in sort[1:]] + list(np.eye(m))
-    chosen: list[Array] = []
-    span = np.zeros((m, 0))
+    chosen: list[Array | ComplexArray] = []
+    span = np.zeros((m, 0), dtype=complex)
     for mix in order:
-        rest = mix - span @ (span.T @ mix)
-        if len(chosen) < m and length(rest) > _INDEPENDENT:
+        rest = mix - span @ (span.conj().T @ mix)
+        size = float(np.linalg.norm(rest))
+        if len(chosen) < m and size > _INDEPENDENT:
             chosen.append(mix)
-            span = np.column_stack((span, rest / length(rest)))
+            span = np.column_stack((span, rest / size))
     return chosen

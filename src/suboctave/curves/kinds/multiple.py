@@ -35,7 +35,7 @@ from suboctave.harmonic.truncation import motion_size
 from suboctave.lazy import lazy
 
 _NAMES = {Kind.INTEGER: "BP", Kind.HALF: "PD", Kind.FREE: "NS"}
-OPERATORS = {name: kind for kind, name in _NAMES.items()}
+_OPERATORS = {name: kind for kind, name in _NAMES.items()} | {"Hopf": Kind.FREE}
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class MultiplePoint(Augmentation):
     @classmethod
     def through(cls, item: Bifurcation, state: BalanceState, names: tuple[str, ...]) -> tuple[MultiplePoint, Array]:
         """See `Augmentation.through`."""
-        own = cls.of(state, OPERATORS[item.kind], item.multiplicity, names[0], item.kappa)
+        own = cls.of(state, _OPERATORS[item.kind], item.multiplicity, names[0], item.kappa)
         return own, np.full(own.extras, item.kappa)
 
     @property
