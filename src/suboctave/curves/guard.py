@@ -38,9 +38,6 @@ from suboctave.floquet.symmetric import distinct, in_rings
 MOVEMENT = 0.5
 #: intervals shorter than this are not cut for the multipliers' movement, nor for that at +1 beside a branch point
 _EXAMINED = 0.01
-#: intervals shorter than this are settled where no multiplier comes near the circle: none lies within so many times the
-#: way that the multipliers move
-_NEAR, _REACH = 1e-3, 10.0
 #: steps shorter than this are not halved to tell a branch point from a jump between curves
 _JUMP = 1e-5
 #: distance from a branch point, as a share of an interval, from which on one cuts it
@@ -198,8 +195,6 @@ class GuardedStep(Interior):
         if crossing is not None and self.measures(p)[0, 0] != self.measures(q)[0, 0]:
             return 0.5, _BESIDE
         doubt = super().doubt(p, q)
-        if doubt is not None and doubt[1] in _REASONS[1:] and h <= _NEAR and _out_of_reach(p, q):
-            return None
         if doubt is None and h > _EXAMINED and _movement(p.floquet.multipliers, q.floquet.multipliers) > MOVEMENT:
             return 0.5, "multipliers move too fast to be followed"
         # right beside a branch point at which the curve turns the multiplier at +1 is known up to its error only
@@ -241,15 +236,14 @@ class GuardedStep(Interior):
         return found is not None
 
     def relative(self, stencil: Sequence[Sample], k: int) -> Iterator[Array]:
-        """See `Interior.relative`: with the functions of multipliers in rings, of equal ones with one, then
-        of those that elements move.
+        """See `Interior.relative`: with the functions of multipliers in rings, of equal ones with one, then of those that
+        elements move.
         """
         known = [s.floquet.multipliers for s in stencil]
         if self.turned or k == 0 or len({len(mu) for mu in known}) > 1 or not np.isfinite(known).all():
             return
         apart = [distinct(mu) for mu in known]
-        if len({len(mu) for mu in apart}) == 1:
-            yield in_rings(np.array(apart), k - 1)
+        yield in_rings(np.array(apart if len({len(mu) for mu in apart}) == 1 else known), k - 1)
         yield of_those_moved(known, [s.grip for s in stencil], k - 1)
 
     def measures(self, sample: Sample) -> Array:
@@ -276,14 +270,6 @@ _REASONS = (
     "a multiplier may pass -1 and come back",
     "a pair of multipliers may leave the unit circle and come back",
 )
-
-
-def _out_of_reach(p: Sample, q: Sample) -> bool:
-    """Whether all multipliers lie so far from the unit circle, for how they move between two samples close together,
-    that none gets there: zeros of `torus` may be those of neutral saddles.
-    """
-    clearance = min(sample.floquet.clearance for sample in (p, q))
-    return _movement(p.floquet.multipliers, q.floquet.multipliers) * _REACH < clearance
 
 
 def _open(p: Sample, q: Sample) -> bool:
