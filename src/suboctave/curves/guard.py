@@ -236,8 +236,8 @@ class GuardedStep(Interior):
         return found is not None
 
     def relative(self, stencil: Sequence[Sample], k: int) -> Iterator[Array]:
-        """See `Interior.relative`: with the functions of multipliers in rings, of equal ones with one, then of those that
-        elements move.
+        """See `Interior.relative`: with the functions of multipliers in rings, equal ones taken for one, then of those
+        that elements move.
         """
         known = [s.floquet.multipliers for s in stencil]
         if self.turned or k == 0 or len({len(mu) for mu in known}) > 1 or not np.isfinite(known).all():
