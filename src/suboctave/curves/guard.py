@@ -32,7 +32,7 @@ from suboctave.curves.interior import FINEST, Interior, Steps, unsettled
 from suboctave.curves.sample import Sample
 from suboctave.curves.trace import Audit
 from suboctave.floquet.held import of_those_moved
-from suboctave.floquet.symmetric import distinct, in_rings
+from suboctave.floquet.symmetric import in_rings
 
 #: multipliers of modulus above one half may move by this much per interval (relative to their modulus above one)
 MOVEMENT = 0.5
@@ -242,7 +242,7 @@ class GuardedStep(Interior):
         known = [s.floquet.multipliers for s in stencil]
         if self.turned or k == 0 or len({len(mu) for mu in known}) > 1 or not np.isfinite(known).all():
             return
-        apart = [distinct(mu) for mu in known]
+        apart = [s.floquet.distinct for s in stencil]
         yield in_rings(np.array(apart if len({len(mu) for mu in apart}) == 1 else known), k - 1)
         yield of_those_moved(known, [s.grip for s in stencil], k - 1)
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from suboctave.floquet.symmetric import UNDAMPED, symmetric_functions
+from suboctave.floquet.symmetric import UNDAMPED, distinct, symmetric_functions
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.lazy import lazy
 
@@ -89,6 +89,11 @@ class FloquetResult:
     def symmetric(self) -> Array:
         """Symmetric functions of the multipliers, (2, 3): see `floquet.symmetric`."""
         return symmetric_functions(self.multipliers)
+
+    @lazy
+    def distinct(self) -> ComplexArray:
+        """One of every set of equal multipliers: see `floquet.symmetric`."""
+        return distinct(self.multipliers)
 
     @property
     def open(self) -> np.ndarray:

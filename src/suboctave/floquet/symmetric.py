@@ -100,9 +100,9 @@ def least_factor(mu: ComplexArray) -> Array:
     i, j = np.triu_indices(len(real), 1)
     products = np.append(np.abs(mu[mu.imag > 0.0]) ** 2, (real[i] * real[j])[real[i] * real[j] > 0.0])
     factors = (1.0 - products) / np.sqrt(1.0 + products**2)
-    if not factors.size or abs(float(np.log(np.abs(mu)).sum())) < UNDAMPED:
-        return np.array([[1.0], [0.0]])
     with np.errstate(divide="ignore"):
+        if not factors.size or abs(float(np.log(np.abs(mu)).sum())) < UNDAMPED:
+            return np.array([[1.0], [0.0]])
         return np.array([[np.prod(np.where(factors < 0.0, -1.0, 1.0))], [np.log(np.abs(factors).min())]])
 
 
