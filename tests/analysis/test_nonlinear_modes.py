@@ -394,3 +394,11 @@ def test_motions_of_modes_against_shooting(tmp_path):
     with pytest.raises(so.InputError, match="the motion of no system that stands by itself"):
         so.verify(damped.points[-1])
     assert not so.stability(damped.points[-1]).applicable
+
+
+def test_an_observed_degree_of_freedom_that_rests_in_the_mode():
+    stiffness = np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 2.0]])
+    system = so.System(np.eye(3), np.zeros((3, 3)), stiffness, [so.CubicSpring(i, 1.0) for i in range(3)], [], {})
+    with pytest.raises(so.InputError, match="rests in this mode"):
+        so.nonlinear_mode(system, 2, amplitude=1.0, observe=1)
+    assert len(so.nonlinear_mode(system, 2, amplitude=0.1, observe=0)) > 2

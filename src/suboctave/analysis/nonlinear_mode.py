@@ -35,6 +35,8 @@ from suboctave.structures.frequencies import natural_frequencies
 
 #: share by which forces deviate from linear ones where a mode begins
 _LINEAR = 1e-4
+#: share of a mode, in mass weights, with which a degree of freedom rests in it
+_RESTS = 1e-8
 #: share of the largest amplitude at which a mode begins that is linear
 _FIRST = 1e-3
 #: the smallest and the largest motion that is thought of, in units of that of unit modal mass
@@ -263,8 +265,11 @@ def _started(linear: _LinearMode, conservative: bool, ranges: Mapping[str, Range
     if measure is not None:
         first, last = (_size_at(linear, measure, value, settings.observe) for value in ranges[measure])
         if not last > 0.0:
+            raise InputError(f"the {measure} at rest is larger already")
+        moving = ranges[measure][1] * float(linear.curve.balance.scales()[0].min())
+        if measure == "amplitude" and not moving > _RESTS * last:
             raise InputError(
-                f"the {measure} at rest is larger already, or the observed DOF rests in this mode: observe="
+                "the observed degree of freedom rests in this mode: choose one that moves, observe=, or give energy="
             )
     size = first if 0.0 < first < math.inf else min(limit, _FIRST * last)
     if not math.isfinite(size):
