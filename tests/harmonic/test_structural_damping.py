@@ -212,3 +212,17 @@ def test_files_keep_it(tmp_path):
 def test_negative_losses_are_warned_of():
     with pytest.warns(so.NegativeDampingWarning, match="structural"):
         so.System(1.0, 0.1, 1.0, loads=[so.HarmonicLoad(0, 1.0)], structural=-0.1)
+
+
+def test_families_of_equal_multipliers():
+    # of three equal masses in a ring two modes are equal: roots of the determinant are double
+    ring = 3.0 * np.eye(3) - 1.0
+    stiffness = np.eye(3) + 0.01 * ring
+    springs = [so.PolynomialSpring(i, {2: 0.5, 3: 0.2}) for i in range(3)]
+    loads = [so.HarmonicLoad(i, 0.4) for i in range(3)]
+    system = so.System(np.eye(3), np.zeros((3, 3)), stiffness, springs, loads, structural=0.03 * stiffness)
+    branch = so.frequency_response(system, (1.9, 2.0))
+    assert [event.multiplicity for event in branch.bifurcations["PD"]] == [1, 2, 2]
+    double = branch.bifurcations["PD"][1]
+    assert np.sort(np.abs(double.multipliers + 1.0))[1] < 1e-7
+    assert not branch.audit.unsettled

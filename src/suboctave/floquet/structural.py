@@ -25,6 +25,7 @@ from dataclasses import replace
 import numpy as np
 
 from suboctave.floquet.result import FloquetResult
+from suboctave.floquet.symmetric import EQUAL
 from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.perturbation import operator_at
@@ -56,49 +57,67 @@ def with_structural_damping(state: BalanceState, viscous: FloquetResult) -> Floq
     near = np.flatnonzero(np.abs(mu) > _NEAR)
     errors[near] = np.maximum(errors[near], _DOUBT * np.abs(decay[near] * mu[near]))
     known: list[complex] = []
-    pairs: list[tuple[int, int]] = [
-        (int(i), int(np.argmin(np.abs(mu - mu[i].conjugate())))) for i in near if mu[i].imag > 0.0
-    ]
+    pairs = [(own, _equal_to(mu, mu[own[0]].conjugate())) for own in _families(mu, near[mu[near].imag > 0.0])]
     for side in (1.0, -1.0):
-        real = near[(mu[near].imag == 0.0) & (side * mu[near].real > 0.0)]
-        roots = _roots(state, exponent[real], known, True)
-        for i, root in zip(real, roots, strict=True):
+        real = _families(mu, near[(mu[near].imag == 0.0) & (side * mu[near].real > 0.0)])
+        roots = _roots(state, exponent[[own[0] for own in real]], real, known, True)
+        for own, root in zip(real, roots, strict=True):
             if root is not None:
-                mu[i], errors[i] = np.exp(2j * math.pi * root).real, viscous.errors[i]
-        left = [int(i) for i, root in zip(real, roots, strict=True) if root is None]
+                mu[own], errors[own] = np.exp(2j * math.pi * root).real, viscous.errors[own]
+        left = [own for own, root in zip(real, roots, strict=True) if root is None]
         pairs += zip(left[::2], left[1::2], strict=False)
     moved = float(np.abs(np.log(np.abs(mu[near])) - decay[near]).max(initial=0.0))
-    middle = {own: complex(exponent[own[0]].real, exponent[list(own)].imag.mean()) for own in pairs}
-    pairs.sort(key=lambda own: abs(middle[own].imag))
-    for group in (pairs[k : k + _AT_ONCE] for k in range(0, len(pairs), _AT_ONCE)):
+    middle = [complex(exponent[own[0]].real, exponent[[own[0], other[0]]].imag.mean()) for own, other in pairs]
+    order = sorted(range(len(pairs)), key=lambda i: abs(middle[i].imag))
+    for group in (order[k : k + _AT_ONCE] for k in range(0, len(order), _AT_ONCE)):
         if 0.0 < _BEYOND * moved < 2.0 * math.pi * abs(middle[group[0]].imag):
             break
-        roots = _roots(state, np.array([middle[own] for own in group]), known, False)
-        for own, root in zip(group, roots, strict=True):
+        roots = _roots(state, np.array([middle[i] for i in group]), [pairs[i][0] for i in group], known, False)
+        for i, root in zip(group, roots, strict=True):
             if root is not None:
-                one = complex(np.exp(2j * math.pi * root))
-                moved = max(moved, 2.0 * math.pi * abs(root.imag - middle[own].imag))
-                mu[list(own)], errors[list(own)] = (one, one.conjugate()), viscous.errors[own[0]]
-    order = np.argsort(-np.abs(mu), kind="stable")
-    return replace(viscous, multipliers=mu[order], errors=errors[order], method="structural damping")
+                (own, other), one = pairs[i], complex(np.exp(2j * math.pi * root))
+                moved = max(moved, 2.0 * math.pi * abs(root.imag - middle[i].imag))
+                mu[own], mu[other] = one, one.conjugate()
+                errors[own] = errors[other] = viscous.errors[own[0]]
+    falling = np.argsort(-np.abs(mu), kind="stable")
+    return replace(viscous, multipliers=mu[falling], errors=errors[falling], method="structural damping")
 
 
-def _roots(state: BalanceState, start: ComplexArray, known: list[complex], on_axis: bool) -> list[complex | None]:
+def _equal_to(mu: ComplexArray, one: complex) -> np.ndarray:
+    """Which multipliers equal one."""
+    return np.flatnonzero(np.abs(mu - one) <= EQUAL * abs(one))
+
+
+def _families(mu: ComplexArray, which: np.ndarray) -> list[np.ndarray]:
+    """Some multipliers as sets of equal ones, which those of equal sectors are."""
+    families: list[np.ndarray] = []
+    for i in which:
+        if not any(i in own for own in families):
+            families.append(np.intersect1d(_equal_to(mu, complex(mu[i])), which))
+    return families
+
+
+def _roots(
+    state: BalanceState, start: ComplexArray, families: list[np.ndarray], known: list[complex], on_axis: bool
+) -> list[complex | None]:
     """Roots kappa of det J_kappa in units of the base frequency, None where none was found; `known` are those found
     before, to which they are added.
 
-    start: all with the real part 0, all with 1 / 2 (`on_axis`), or all between.
+    start: all with the real part 0, all with 1 / 2 (`on_axis`), or all between; families: a root is as many fold as it
+    has multipliers.
     """
     if not len(start):
         return []
     high = state.basis.harmonics
     # closed under conjugation where the determinant is real
     waves = np.arange(-high - int(on_axis and start[0].real != 0.0), high + 1)
-    kappa, step, ahead = start.copy(), np.full(len(start), np.inf, dtype=complex), 1j * _APART
+    kappa, step = start.copy(), np.full(len(start), np.inf, dtype=complex)
     if not on_axis:
         kappa.real = np.clip(kappa.real, _INSIDE, 0.5 - _INSIDE)
-    left = np.arange(len(start))
+    left, fold = np.arange(len(start)), np.array([float(len(own)) for own in families])
     for _ in range(_STEPS):
+        # near a root of several folds the determinant is no line over more than a part of the way
+        ahead = 1j * np.minimum(_APART, 0.1 * np.abs(step[left]))
         both = np.concatenate((kappa[left], kappa[left] + ahead))
         sign, log = np.linalg.slogdet(operator_at(state, (both[:, None] + waves) * state.rate))
         (sign, turned), (log, longer) = np.split(sign, 2), np.split(log, 2)
@@ -107,23 +126,20 @@ def _roots(state: BalanceState, start: ComplexArray, known: list[complex], on_ax
             # Aberth's correction: each stays away from where the others are going
             apart = kappa[left][:, None] - np.append(kappa, known)
             apart[np.arange(len(left)), left] = np.inf
-            newton = newton / (1.0 + newton * np.sum(1.0 / apart, axis=1))
+            newton = fold[left] * newton / (1.0 + newton * np.sum(np.append(fold, np.ones(len(known))) / apart, axis=1))
         if on_axis:
             newton = 1j * newton.imag
         else:
-            ahead_of, room = (
-                kappa[left].real + newton.real,
-                _LEFT * np.minimum(kappa[left].real, 0.5 - kappa[left].real),
-            )
-            newton.real = np.clip(ahead_of, room, 0.5 - room) - kappa[left].real
+            room = _LEFT * np.minimum(kappa[left].real, 0.5 - kappa[left].real)
+            newton.real = np.clip(kappa[left].real + newton.real, room, 0.5 - room) - kappa[left].real
         step[left] = newton
         kappa[left] += newton
         left = left[(np.abs(step[left]) > _CLOSE) & (np.abs(kappa[left] - start[left]) <= _FAR)]
         if not len(left):
             break
     roots: list[complex | None] = []
-    for root, last, begun in zip(kappa.tolist(), step.tolist(), start.tolist(), strict=True):
+    for root, last, begun, own in zip(kappa.tolist(), step.tolist(), start.tolist(), families, strict=True):
         found = abs(last) <= _CLOSE and abs(root - begun) <= _FAR and all(abs(root - one) > _SAME for one in known)
         roots.append(root if found else None)
-        known += [root] if found else []
+        known += [root] * len(own) if found else []
     return roots

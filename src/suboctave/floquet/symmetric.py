@@ -29,7 +29,7 @@ from suboctave.harmonic.basis import Array, ComplexArray
 #: sum of the logarithms of all multipliers, `-int trace(M^-1 (C + f_v)) dt`, below which a motion counts as undamped
 UNDAMPED = 1e-9
 #: relative difference up to which multipliers are equal: of two that meet rounding leaves 1e-8
-_EQUAL = 1e-7
+EQUAL = 1e-7
 #: squares of products beyond which a factor is one to rounding
 _LARGE = 1e280
 #: modulus of a multiplier, or of a product of two, up to which its ring would have to grow many times over to reach 1
@@ -42,7 +42,7 @@ def distinct(mu: ComplexArray) -> ComplexArray:
     """
     if len(mu) < 2:
         return mu
-    alike = np.abs(mu[:, None] - mu[None, :]) <= _EQUAL * np.abs(mu)[:, None]
+    alike = np.abs(mu[:, None] - mu[None, :]) <= EQUAL * np.abs(mu)[:, None]
     return mu[~np.tril(alike, -1).any(axis=1)]
 
 
