@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import suboctave as so
 from suboctave.bifurcation.measures import crossing_pair
 
 LEAVING = (0.97 + 0.07j, 1.02 + 0.05j)
@@ -38,3 +39,29 @@ def test_real_ones_that_meet_do_not_cross_as_a_pair():
     # beside a pair that leaves the circle the number outside grows by more
     pair = np.array([0.9 + 0.4j, 0.9 - 0.4j]), np.array([0.95 + 0.4j, 0.95 - 0.4j])
     assert crossing_pair(np.append(first, pair[0]), np.append(last, pair[1]), 3, 1) == (0.9 + 0.4j, 0.95 + 0.4j)
+
+
+@pytest.mark.parametrize(("harmonics", "max_step"), [(5, 0.06), (5, 0.1), (7, 0.02), (7, 0.06)])
+def test_a_torus_that_few_harmonics_have_beside_the_step_is_listed(harmonics, max_step):
+    """Multipliers are those of the completed motion, J_kappa that of the truncated one: where both cross differs."""
+    n = 6
+    gyroscopic, circulatory = np.zeros((n, n)), np.zeros((n, n))
+    gyroscopic[0, 1], gyroscopic[3, 4], circulatory[2, 3] = 0.3, 0.2, 0.02
+    gyroscopic, circulatory = gyroscopic - gyroscopic.T, circulatory - circulatory.T
+    stiffness = 2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
+    system = so.System(
+        np.eye(n) + 0.1 * np.eye(n, k=1) + 0.1 * np.eye(n, k=-1),
+        0.05 * stiffness + gyroscopic,
+        stiffness + circulatory + np.diag([0.2, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        [so.CubicSpring(5, 0.8), so.ElasticStop((3, 5), 2.0, 0.3)],
+        [so.HarmonicLoad(1, 0.4), so.HarmonicLoad(0, 0.1, phase=0.7)],
+    )
+    branch = so.frequency_response(system, (0.565, 0.58), harmonics=harmonics, max_step=max_step)
+    first, last = branch.bifurcations["NS"]
+    # with more harmonics
+    assert first.omega == pytest.approx(0.56958, abs=2e-4)
+    assert last.omega == pytest.approx(0.57506, abs=5e-4)
+    assert not branch.audit.unsettled
+    # on the other side of a motion than multipliers show them
+    if max_step == 0.06:
+        assert 1e-6 < max(first.uncertainty, last.uncertainty) < 2e-4

@@ -83,7 +83,8 @@ class Bifurcation:
         Frequency of the perturbation at an NS or a Hopf point, rad per unit time; else 0.
     uncertainty
         Half-width in the free parameter of what is not resolved: of the bracket if the point could only be bracketed;
-        behind a grazing that of the neglected harmonics, estimated with half as many more; else 0.
+        behind a grazing that of the neglected harmonics, estimated with half as many more; of an NS how far it lies
+        from the motions between which multipliers pass the circle, where few harmonics part the two; else 0.
     contact
         The contact that grazes: at a grazing its own; at another bifurcation the one whose beginning or end brings it
         about (it lies in the square-root layer behind that grazing, see `layer`); None for a smooth bifurcation.

@@ -81,6 +81,8 @@ def bifurcation_at(located: Located, a: Sample, b: Sample, observe: int, warning
         )
     unit = curve.unit(located.sample.point.weights)
     item = solved_bifurcation(located.kind, solution, curve, observe, warnings, arclength, unit, (a, b))
+    if located.width > item.uncertainty:
+        item = replace(item, uncertainty=located.width)
     if item.kind != "BP":
         return item
     share = located.fraction

@@ -328,7 +328,7 @@ _ROUNDS, _SETTLED = 20, 1e-12
 @dataclass(frozen=True)
 class Located:
     """A bifurcation between two neighbours: solved (`solution`), or only the change of its test bracketed (`bracket`,
-    its second end `sample`, with its width).
+    its second end `sample`, with its width). One that is solved has a width where it lies beside them.
     """
 
     kind: BifurcationKind
@@ -352,6 +352,33 @@ def locate(
     After so many bisections the bracket is taken for the answer. `begins`: whether the curve begins with the first
     neighbour; what lies right before it then belongs to no other step.
     """
+    found = _located(kind, a, b, newton, bisections, begins)
+    missed = found is None or found.solution is None
+    return (_beside(kind, a, b) or found) if missed and kind.counted else found
+
+
+def _beside(kind: BifurcationKind, a: Sample, b: Sample) -> Located | None:
+    """What multipliers show between two neighbours and the harmonics solved for have beside them, no farther off than
+    these are apart; None if there is nothing.
+    """
+    share = kind.fraction(a, b)
+    nearer = a if share < 0.5 else b
+    solved = _solved(kind, between(a.point, b.point, share), b.point, nearer)
+    if solved is None:
+        return None
+    size = length(b.point.weights * (b.point.u - b.curve.transfer(a.point.u, a.curve)))
+    ends = [(end, length(b.point.weights * (solved[1] - b.curve.transfer(end.point.u, end.curve)))) for end in (a, b)]
+    end, away = min(ends, key=lambda entry: entry[1])
+    if away > size:
+        return None
+    width = abs(float(solved[1][-1]) - end.point.parameter)
+    return Located(kind, 0.0 if end is a else 1.0, end, solved[0], width)
+
+
+def _located(
+    kind: BifurcationKind, a: Sample, b: Sample, newton: NewtonOptions, bisections: int, begins: bool
+) -> Located | None:
+    """What of it lies between two neighbours."""
     low, high = 0.0, 1.0
     at_low, at_high = a, b
     before, behind = (_BEFORE if kind.counted and not end.floquet.decided else _SLACK for end in (a, b))
