@@ -32,12 +32,14 @@ from suboctave.curves.interior import FINEST, Interior, Steps, unsettled
 from suboctave.curves.sample import Sample
 from suboctave.curves.trace import Audit
 from suboctave.floquet.held import of_those_moved
-from suboctave.floquet.symmetric import in_rings
+from suboctave.floquet.symmetric import in_rings, symmetric_functions
 
 #: multipliers of modulus above one half may move by this much per interval (relative to their modulus above one)
 MOVEMENT = 0.5
 #: intervals shorter than this are not cut for the multipliers' movement, nor for that at +1 beside a branch point
 _EXAMINED = 0.01
+#: distance from +1 or -1 up to which several real multipliers may be taken for each other
+_CROWD = 0.1
 #: steps shorter than this are not halved to tell a branch point from a jump between curves
 _JUMP = 1e-5
 #: distance from a branch point, as a share of an interval, from which on one cuts it
@@ -195,7 +197,10 @@ class GuardedStep(Interior):
         if crossing is not None and self.measures(p)[0, 0] != self.measures(q)[0, 0]:
             return 0.5, _BESIDE
         doubt = super().doubt(p, q)
-        if doubt is None and h > _EXAMINED and _movement(p.floquet.multipliers, q.floquet.multipliers) > MOVEMENT:
+        if doubt is None and h > _EXAMINED and (
+            _movement(p.floquet.multipliers, q.floquet.multipliers) > MOVEMENT
+            or not (eventful or _apart(p.floquet.distinct, q.floquet.distinct))
+        ):
             return 0.5, "multipliers move too fast to be followed"
         # right beside a branch point at which the curve turns the multiplier at +1 is known up to its error only
         return None if doubt is not None and doubt[1] == _RETURNS and h <= _EXAMINED and self.turned else doubt
@@ -239,12 +244,24 @@ class GuardedStep(Interior):
         """See `Interior.relative`: with the functions of multipliers in rings, equal ones taken for one, then of those
         that elements move.
         """
-        known = [s.floquet.multipliers for s in stencil]
+        known, apart = ([getattr(s.floquet, name) for s in stencil] for name in ("multipliers", "distinct"))
         if self.turned or k == 0 or len({len(mu) for mu in known}) > 1 or not np.isfinite(known).all():
             return
-        apart = [s.floquet.distinct for s in stencil]
-        yield in_rings(np.array(apart if len({len(mu) for mu in apart}) == 1 else known), k - 1)
-        yield of_those_moved(known, [s.grip for s in stencil], k - 1)
+        if _families(stencil):
+            yield in_rings(np.array(apart), k - 1)
+        elif len(apart[0]) == len(known[0]):
+            yield in_rings(np.array(known), k - 1)
+            yield of_those_moved(known, [s.grip for s in stencil], k - 1)
+
+    def tests(self, stencil: Sequence[Sample]) -> list[Array]:
+        """See `Interior.tests`: of equal multipliers with one, where there are as many all along. A family that passes
+        the circle in the same step as a single one would go unseen, its zero being double.
+        """
+        tests = super().tests(stencil)
+        if self.turned or not _families(stencil):
+            return tests
+        own = (symmetric_functions(s.floquet.distinct) for s in stencil)
+        return [np.column_stack((one[:, :1], functions)) for one, functions in zip(tests, own, strict=True)]
 
     def measures(self, sample: Sample) -> Array:
         """The tests at a sample, without their zeros at a branch point at which the curve turns back."""
@@ -272,6 +289,12 @@ _REASONS = (
 )
 
 
+def _families(stencil: Sequence[Sample]) -> bool:
+    """Whether motions have families of equal multipliers, as many at all of them."""
+    counts = {len(s.floquet.distinct) for s in stencil}
+    return len(counts) == 1 and counts != {len(stencil[0].floquet.multipliers)}
+
+
 def _open(p: Sample, q: Sample) -> bool:
     """Whether a multiplier lies within its error of the unit circle at either of two samples."""
     return not (p.floquet.decided and q.floquet.decided)
@@ -297,6 +320,27 @@ def _explained(p: Sample, q: Sample) -> bool:
     single = sum(kind.multiplicity for kind in kinds) - pairs
     # at a pitchfork the bifurcating branch turns back and is its own mirror image beyond
     return change <= single + 2 * pairs and ({"LP", "BP"} <= changed or (change - single) % 2 == 0)
+
+
+@kernel()
+def _apart(old, new):
+    """Whether real multipliers near +1 or -1, where there are several, stay farther from there than they move: one that
+    passes and another that comes back would leave the number of those outside as it was, and the product of all.
+    """
+    for target in (1.0, -1.0):
+        near = 0
+        for mu in new:
+            near += mu.imag == 0.0 and abs(mu.real - target) < _CROWD
+        for mu in new:
+            if near > 1 and mu.imag == 0.0 and abs(mu.real - target) < _CROWD:
+                moved, clearance = np.inf, 0.0
+                for other in old:
+                    if other.imag == 0.0 and abs(mu.real - other.real) < moved:
+                        moved = abs(mu.real - other.real)
+                        clearance = min(abs(mu.real - target), abs(other.real - target))
+                if moved > clearance:
+                    return False
+    return True
 
 
 @kernel()

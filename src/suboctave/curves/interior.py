@@ -214,6 +214,10 @@ class Interior(ABC):
     def measures(self, sample: Sample) -> Array:
         """Signs and logarithms of the moduli of functions smooth along the curve, shape (2, m)."""
 
+    def tests(self, stencil: Sequence[Sample]) -> list[Array]:
+        """Those at every sample of a stencil."""
+        return [self.measures(one) for one in stencil]
+
     def relative(self, stencil: Sequence[Sample], k: int) -> Iterable[Array]:
         """Functions (N, 2, m) with together the same zeros as `measures`' function k that are smoother where the linear
         structure has many vibrations in a period, in several ways.
@@ -291,7 +295,7 @@ class Interior(ABC):
             return (1.0 - _CUT if contacts.shrinking[0][3] else _CUT), _SQUARE_ROOT
         share, reason = 0.5, "nothing was looked at"
         if len(stencil) > 2:
-            places, tests = roots or [one.place for one in stencil], [self.measures(one) for one in stencil]
+            places, tests = roots or [one.place for one in stencil], self.tests(stencil)
             doubt = first_doubtful(places, tests, at, lambda k: self.relative(stencil, k))
             if doubt is None:
                 return None
