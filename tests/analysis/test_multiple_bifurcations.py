@@ -299,3 +299,19 @@ def test_hopf_points_whose_cycles_cannot_be_told_apart():
     event = next(event for event in branch.bifurcations if event.multiplicity == 2)
     with pytest.raises(ConvergenceError, match="2 Hopf points fall together"):
         so.limit_cycles(event, harmonics=5)
+
+
+def test_a_family_that_leaves_as_another_enters_in_one_step():
+    # between two points the count of unstable multipliers stays, and so do the signs of all determinants
+    branch = so.frequency_response(oscillators(11, 0.0465174919, p=0.3128428875), (2.0, 2.25))
+    assert [event.multiplicity for event in branch.bifurcations].count(2) == 18
+    assert not branch.audit.unsettled
+
+
+def test_blades_that_are_not_quite_equal():
+    # modes that lie close together: a step that holds too much is taken in shorter ones
+    system = oscillators(5, 0.004, every=True)
+    unequal = system.stiffness.sparse_value(system.parameters) + np.diag([0.003, -0.002, 0.001, -0.004, 0.0])
+    system = so.System(np.eye(5), DAMPING * np.eye(5), unequal, system.elements, system.loads, system.parameters)
+    branch = so.frequency_response(system, (1.8, 2.3))
+    assert [event.multiplicity for event in branch.bifurcations["PD"]] == [1] * 10

@@ -197,9 +197,13 @@ class GuardedStep(Interior):
         if crossing is not None and self.measures(p)[0, 0] != self.measures(q)[0, 0]:
             return 0.5, _BESIDE
         doubt = super().doubt(p, q)
-        if doubt is None and h > _EXAMINED and (
-            _movement(p.floquet.multipliers, q.floquet.multipliers) > MOVEMENT
-            or not (eventful or _apart(p.floquet.distinct, q.floquet.distinct))
+        if (
+            doubt is None
+            and h > _EXAMINED
+            and (
+                _movement(p.floquet.multipliers, q.floquet.multipliers) > MOVEMENT
+                or not (eventful or _apart(p.floquet.distinct, q.floquet.distinct))
+            )
         ):
             return 0.5, "multipliers move too fast to be followed"
         # right beside a branch point at which the curve turns the multiplier at +1 is known up to its error only

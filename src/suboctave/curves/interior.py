@@ -42,6 +42,8 @@ __all__ = ["FINEST", "Interior", "Steps", "contacts_between", "unsettled"]
 FINEST = 1e-5
 #: samples inside one step after which it is halved, or called unsettled
 MOST_PROBES = 60
+#: steps shorter than this are not halved for that
+_CROWDED = 0.01
 #: a step belongs to one curve if its interior lies within this share of its length from where its ends say
 _AWAY = 0.03
 #: pairs of samples whose contacts are remembered, at least
@@ -270,6 +272,9 @@ class Interior(ABC):
                 if not self.harmless(p, q, reason):
                     self.unsettled.append(unsettled(p, q, reason))
                 continue
+            if self.probes >= MOST_PROBES and self.size > _CROWDED:
+                self.refused = True
+                return
             halves = self.cut(p, q, share) if self.probes < MOST_PROBES else []
             if not halves and not self.refused:
                 self.unsettled.append(unsettled(p, q, reason))
