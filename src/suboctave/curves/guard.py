@@ -127,6 +127,7 @@ class GuardedStep(Interior):
     """One step along a response under examination."""
 
     steps: StepGuard
+    crowded = 0.01
 
     def __init__(self, guard: StepGuard, old: Sample, new: Sample) -> None:
         super().__init__(guard, old, new, _REASONS)

@@ -42,8 +42,6 @@ __all__ = ["FINEST", "Interior", "Steps", "contacts_between", "unsettled"]
 FINEST = 1e-5
 #: samples inside one step after which it is halved, or called unsettled
 MOST_PROBES = 60
-#: steps shorter than this are not halved for that
-_CROWDED = 0.01
 #: a step belongs to one curve if its interior lies within this share of its length from where its ends say
 _AWAY = 0.03
 #: pairs of samples whose contacts are remembered, at least
@@ -199,6 +197,9 @@ class Interior(ABC):
         What is in doubt where a function may vanish unseen, one sentence for each of `measures`.
     """
 
+    #: length above which a step that takes too many samples is halved
+    crowded: float = math.inf
+
     def __init__(self, steps: Steps, old: Sample, new: Sample, reasons: Sequence[str]) -> None:
         behind = steps.leading_to(old)[-Steps.reach :]
         self.samples = [*behind, new]
@@ -272,7 +273,7 @@ class Interior(ABC):
                 if not self.harmless(p, q, reason):
                     self.unsettled.append(unsettled(p, q, reason))
                 continue
-            if self.probes >= MOST_PROBES and self.size > _CROWDED:
+            if self.probes >= MOST_PROBES and self.size > self.crowded:
                 self.refused = True
                 return
             halves = self.cut(p, q, share) if self.probes < MOST_PROBES else []
