@@ -24,8 +24,8 @@ from suboctave.continuation.problem import Array
 from suboctave.curves.events.locate import Singular
 from suboctave.curves.follow import both_ways, follow, same_event
 from suboctave.curves.junction import UNSEEN, Beside, beside, curvature_of, emanating, period_name
+from suboctave.curves.leaving import branch_beside, first_beside
 from suboctave.curves.motion import MotionProblem
-from suboctave.curves.multiple import branch_beside, first_beside
 from suboctave.curves.starts import Harmonics, harmonics_of, linear_up_to, own_linear_part, start_point
 from suboctave.curves.trace import BranchPoint, Settings, Trace
 from suboctave.errors import ConvergenceError, InputError, is_number
@@ -435,11 +435,10 @@ def _oriented(direction: Array, weights: Array) -> Array:
 def _away(
     item: Bifurcation, curve: MotionProblem, u: Array, direction: Array, settings: Settings, notes: list[str]
 ) -> CurvePoint:
-    """The first point of a branch that leaves a bifurcation, in the harmonics that it needs."""
+    """The first point of a branch that leaves a bifurcation."""
     weights = curve.weights(u, 0.0)
     x, omega, values = curve.split(u)
     curve = curve.with_balance(curve.balance.settle(x, omega, values))
-    # over the period of the branch
     if item.multiplicity > 1:
         close = first_beside(curve, u, weights, direction / length(weights * direction))
     else:
@@ -453,6 +452,7 @@ def _away(
 def _closest(item: Bifurcation, curve: MotionProblem, u: Array, direction: Array, settings: Settings) -> Beside:
     """The point right beside a simple bifurcation, in the harmonics that it needs."""
     weights = curve.weights(u, 0.0)
+    # over the period of the branch
     expected = item.floquet.multipliers ** (2 if item.kind == "PD" else 1)
     leads = curvature_of(item.normal_form)
     close = beside(curve, u, direction / length(weights * direction), weights, expected, settings.newton, leads)

@@ -200,7 +200,7 @@ class _Growth:
                 if met is not None:
                     if item.multiplicity > 1:
                         # a branch uses up one of those that fall together
-                        known.remove(met)
+                        known = [place for place in known if place is not met]
                     continue
                 full = full or count >= self.most
                 if full or interruption is not None or not self.followed(node, item):
@@ -224,8 +224,11 @@ class _Growth:
                 count += 1
                 node.children.append(child)
                 waiting.append(child)
-                own = item.multiplicity > 1
-                known += [place for place in _shared(child) if not (own and place[0].same_place(item, span, place[1]))]
+                # where it has left, others that fall together with it leave as well
+                several = item.multiplicity > 1
+                known += [
+                    place for place in _shared(child) if not (several and place[0].same_place(item, span, place[1]))
+                ]
                 interruption = branch.interruption
         left = sum(len(node.left) for node in root)
         if full or interruption is not None:

@@ -16,8 +16,8 @@ from suboctave.continuation.linear import length
 from suboctave.continuation.newton import NewtonOptions, correct
 from suboctave.curves.hopf import shape_of
 from suboctave.curves.kinds.multiple import MultiplePoint
+from suboctave.curves.leaving import independent
 from suboctave.curves.motion import MotionEvaluation
-from suboctave.curves.multiple import independent
 from suboctave.curves.starts import linear_up_to, own_linear_part, rule_of
 from suboctave.curves.trace import BranchPoint
 from suboctave.curves.tracked.start import curve_through

@@ -154,8 +154,11 @@ def _broken(item: Bifurcation, curve: MotionProblem, u: Array, along: Array, nam
     n, span = curve.balance.dimension, curve.spans[curve.names.index(name)]
     if item.kind == "BP" and np.abs(along[n : -len(curve.names)]).max() * span > _UNFOLDED:
         return True
-    equations = curve.evaluate(u).equations.own
-    return isinstance(equations, MultipleEquations) and equations.parting(along) * span > _PARTED * curve.spans[0]
+    if item.multiplicity == 1:
+        return False
+    equations = curve.evaluate(u).equations
+    assert isinstance(equations, MultipleEquations)
+    return equations.parting(along) * span > _PARTED * curve.spans[0]
 
 
 def foretold(item: TrackedEvent, changes: Mapping[str, float]) -> TrackedEvent:

@@ -33,9 +33,9 @@ from suboctave.curves.events.monitors import (
 from suboctave.curves.guard import Crossing, GuardedStep, StepGuard
 from suboctave.curves.identity import relation
 from suboctave.curves.junction import UNSEEN, Meeting, meeting
+from suboctave.curves.leaving import multiple_at
 from suboctave.curves.ledgers import REASON, CountCheck, DoublingWatch, HiddenDoublings, pair_in
 from suboctave.curves.motion import CRITICAL, MotionProblem
-from suboctave.curves.multiple import multiple_at
 from suboctave.curves.refine import bifurcation_at, solved_bifurcation, solved_in, turns_at
 from suboctave.curves.sample import Sample
 from suboctave.curves.trace import Settings, Trace, joined

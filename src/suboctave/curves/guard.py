@@ -198,14 +198,7 @@ class GuardedStep(Interior):
         if crossing is not None and self.measures(p)[0, 0] != self.measures(q)[0, 0]:
             return 0.5, _BESIDE
         doubt = super().doubt(p, q)
-        if (
-            doubt is None
-            and h > _EXAMINED
-            and (
-                _movement(p.floquet.multipliers, q.floquet.multipliers) > MOVEMENT
-                or not (eventful or _apart(p.floquet.distinct, q.floquet.distinct))
-            )
-        ):
+        if doubt is None and h > _EXAMINED and _too_fast(p, q, eventful):
             return 0.5, "multipliers move too fast to be followed"
         # right beside a branch point at which the curve turns the multiplier at +1 is known up to its error only
         return None if doubt is not None and doubt[1] == _RETURNS and h <= _EXAMINED and self.turned else doubt
@@ -327,10 +320,18 @@ def _explained(p: Sample, q: Sample) -> bool:
     return change <= single + 2 * pairs and ({"LP", "BP"} <= changed or (change - single) % 2 == 0)
 
 
+def _too_fast(p: Sample, q: Sample, eventful: bool) -> bool:
+    """Whether multipliers move too fast between two samples to be followed."""
+    if _movement(p.floquet.multipliers, q.floquet.multipliers) > MOVEMENT:
+        return True
+    ends = p.floquet.distinct, q.floquet.distinct
+    return not (eventful or (_keep_off(*ends) and _keep_off(*reversed(ends))))
+
+
 @kernel()
-def _apart(old, new):
-    """Whether real multipliers near +1 or -1, where there are several, stay farther from there than they move: one that
-    passes and another that comes back would leave the number of those outside as it was, and the product of all.
+def _keep_off(old, new):
+    """Whether new real multipliers near +1 or -1, where there are several, are farther from there than they have moved:
+    one that passes and another that comes back leave the number of those outside as it was, and the sign of products.
     """
     for target in (1.0, -1.0):
         near = 0

@@ -186,7 +186,8 @@ def meeting(a: CurvePoint, b: CurvePoint, newton: NewtonOptions) -> Meeting | No
     state = doubling.state
     there = curve.transfer(parent.u_of(state), parent)
     if ahead:
-        reached = length(b.weights * (there - u)) <= _FORETOLD * length(b.weights * (u - b.u))
+        # beside a simple one motions are told apart as close as one likes: there is no need to end early
+        reached = several > 1 and length(b.weights * (there - u)) <= _FORETOLD * length(b.weights * (u - b.u))
     else:
         place = position(a, b, there)
         reached = place is not None and -1e-6 <= place <= 1.0 + (1e-6 if turned else 2.0 * _VANISHED)
