@@ -164,6 +164,34 @@ def test_all_amplitudes_at_a_hopf_point_without_nonlinear_forces():
     assert "grow without bound" in cycles.ended
 
 
+BRANCHING = [
+    "x'' + 0.087997*x' + 0.742297*x - mu*0.836891*x' + 1.080678*x**2*x' + 0.019262*x**3 + 0.425508*x**5"
+    " - 0.234624*x**2*x'*mu - 0.322691*(y-x) + 0.087417*mu*y - 0.497071*(x-y)**3 = 0",
+    "y'' + 0.034569*y' + 2.096762*y - mu*0.426615*y' + 0.804409*y**2*y' + 0.347905*y'**3 + 0.266271*(x-y) = 0",
+]
+
+
+def test_a_branch_point_that_asks_for_more_harmonics():
+    """Where curves cross their own equations are singular: it is located again by others."""
+    hopf = so.equilibria(so.System.from_equations(BRANCHING, {"mu": 0.0}), "mu", (-1.0, 2.0)).bifurcations["Hopf"][1]
+    cycles = so.limit_cycles(hopf)
+    (crossing,) = cycles.bifurcations["BP"]
+    assert not cycles.warnings
+    assert crossing.orbit.basis.harmonics > 19
+    # that of 63 harmonics
+    assert crossing.parameter("mu") == pytest.approx(1.0552731227, abs=1e-9)
+    assert np.sort(np.abs(crossing.multipliers - 1.0))[1] < 1e-6
+
+
+def test_nothing_is_suspected_where_cycles_shrink_to_rest():
+    """Both parameters stand still there, and a second multiplier comes to +1."""
+    text = "x'' + 0.097555*x' + 1.778399*x - mu*0.793927*x' + 1.227672*x**2*x' + 0.38996*x'**3 = 0"
+    hopf = hopf_of(so.System.from_equations(text, {"mu": 0.0}), "mu", (-0.2, 0.4))
+    cycles = so.limit_cycles(hopf)
+    assert not cycles.warnings
+    assert hopf.parameter("mu") == pytest.approx(cycles.bifurcations["Hopf"][0].parameter("mu"), abs=1e-9)
+
+
 def test_from_a_response_to_a_small_load():
     system = so.System.from_equations("x'' + x + (x**2-mu)*x' = F*cos(omega*t)", {"mu": 0.5, "F": 0.05})
     response = so.frequency_response(system, (0.985, 1.03), start=[0.0, 1.4])

@@ -165,3 +165,29 @@ def test_a_step_whose_interior_has_no_solution_is_halved(systems: ModuleType, hi
     assert not any("GPD may lie" in note for note in border.warnings)
     # and where it jumps from there to the other sign there is none
     assert not any("GPD near" in note for note in border.warnings)
+
+
+@pytest.mark.parametrize("curve", [(734, "PD"), *slow((700, "LP"), (716, "LP"), (744, "LP"))], ids=str)
+def test_what_turns_in_a_corner_turns_there_once_whatever_the_steps(systems, curve):
+    """Over the load, where another contact grazes: a curve neither comes back along itself nor turns to and fro."""
+    seed, kind = curve
+    described = systems.describe(seed, strong=False)
+    low, high = sorted(described["omega"])
+    amplitude = described["loads"][0]["amplitude"]
+    described["loads"][0]["amplitude"] = "p"
+    system = systems.system_of(described, {"p": amplitude})
+    start = so.frequency_response(system, tuple(described["omega"])).bifurcations[kind][0]
+    ranges = {"bounds": (0.3 * amplitude, 2.5 * amplitude), "omega": (0.5 * low, 1.5 * high)}
+    coarse, fine = (so.track(start, "p", **ranges, max_step=step) for step in (None, 0.015))
+    at = {(item.kind, item.parameter_name, item.extreme): [] for item in fine.bifurcations}
+    for item in fine.bifurcations:
+        at[item.kind, item.parameter_name, item.extreme].append((item.omega, item.parameter("p"), item.uncertainty))
+    for item in coarse.bifurcations:
+        others = at[item.kind, item.parameter_name, item.extreme]
+        known = min(others, key=lambda other: abs(other[0] - item.omega) + abs(other[1] - item.parameter("p")))
+        assert abs(known[0] - item.omega) < 1e-8 + 3.0 * (known[2] + item.uncertainty)
+        others.remove(known)
+    # of one corner of 700, 8e-7 of the load from a cusp, the larger steps see nothing
+    left = [known for others in at.values() for known in others]
+    assert len(left) == (3 if seed == 700 else 0)
+    assert np.ptp([known[1] for known in left] or [0.0]) < 1e-6

@@ -23,6 +23,7 @@ from suboctave.curves.kinds.branch_point import BranchPointEquations
 from suboctave.curves.kinds.extremum import ExtremalEquations
 from suboctave.curves.kinds.free_phase import FreePhaseEquations, FreePhaseOperator
 from suboctave.curves.kinds.grazing import GrazingEquations
+from suboctave.curves.kinds.limit_cycle import oscillating
 from suboctave.curves.kinds.multiple import MultipleEquations
 from suboctave.curves.kinds.nonlinear_mode import ModeEquations
 from suboctave.curves.kinds.singular import SingularEquations, SingularOperator
@@ -184,6 +185,13 @@ class Sample:
         """Components of the tangent along the free parameters, by name."""
         names = self.curve.names
         return dict(zip(names, self.point.tangent[-len(names) :].tolist(), strict=True))
+
+    @lazy
+    def oscillation(self) -> float:
+        """Size of the motion but its mean, in scaled arclength: as slopes do, it vanishes where cycles shrink to an
+        equilibrium.
+        """
+        return length(oscillating(self.state)) / self.curve.unit(self.point.weights)
 
     @property
     def kappa(self) -> float:

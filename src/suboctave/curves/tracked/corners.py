@@ -76,6 +76,11 @@ def beyond_corner(
     return None, f"{label} grazes at {where}: the equations are not smooth there"
 
 
+def grazes(point: CurvePoint) -> bool:
+    """Whether a contact grazes about there: the curve may have come from where its parameter leads on."""
+    return _grazing(Sample(point)) is not None
+
+
 def _grazing(sample: Sample) -> tuple[GapExtrema, int, float] | None:
     """The extremum nearest to a grazing: its gap, its index there, its height over the gap; None if all are far."""
     heights = [(gap, i, h) for gap in gap_extrema(sample.state) for i, h in enumerate((gap.value - gap.level).tolist())]

@@ -318,20 +318,7 @@ def refined(event: LocatedEvent, newton: NewtonOptions, warnings: list[str]) -> 
         if basis is None:
             break
         try:
-            finer, state = curve.finer(sample.state, basis)
-            u = finer.transfer(sample.point.u, curve)
-            u[: finer.balance.dimension] = state.unknowns
-            chord = event.chord() if isinstance(event.test, CurvesCross) and sample is event.sample else None
-            along = finer.transfer(sample.point.tangent if chord is None else chord, curve)
-            weights = finer.weights(u, curve.size(sample.point.u))
-            start = nearest_point(finer, u, weights, newton, along, BEGINNING)
-            start = replace(start, arclength=sample.point.arclength)
-            if chord is not None:
-                # where curves cross the equations have no direction of their own
-                start = replace(start, tangent=along / length(weights * along))
-            near = Sample(start)
-            test = event.test.within(near, near)
-            sample = zero_along(start, test.value, newton, _BESIDE, event.slope, factor=start.factor)
+            sample = _with_more(event, sample, basis, newton)
         except ConvergenceError as failure:
             words = (
                 f"{event.test.kind} near {curve.where(sample.point.u)} was located with "
@@ -345,21 +332,43 @@ def refined(event: LocatedEvent, newton: NewtonOptions, warnings: list[str]) -> 
                     event = replace(event, off=_ROUGH * event.rough.way)
             warnings.append(words)
             break
-    if isinstance(event.test, CurvesCross):
-        sample = _crossing(sample, replace(event, sample=sample).chord())
+    if isinstance(event.test, CurvesCross) and sample is event.sample:
+        with suppress(ConvergenceError):
+            sample = _crossing(event, sample.curve, sample.point.u)
     return event if sample is event.sample else replace(event, sample=sample)
 
 
-def _crossing(sample: Sample, chord: Array | None) -> Sample:
-    """Where curves cross, located as exactly as other events, with the direction of the curve; the same where that
-    does not succeed.
+def _with_more(event: LocatedEvent, sample: Sample, basis: HarmonicBasis, newton: NewtonOptions) -> Sample:
+    """An event in a basis with more harmonics, beside the place that it has with fewer; raises ConvergenceError."""
+    curve = sample.curve
+    finer, state = curve.finer(sample.state, basis)
+    u = finer.transfer(sample.point.u, curve)
+    u[: finer.balance.dimension] = state.unknowns
+    if isinstance(event.test, CurvesCross):
+        return _crossing(event, finer, u)
+    weights = finer.weights(u, curve.size(sample.point.u))
+    start = nearest_point(finer, u, weights, newton, finer.transfer(sample.point.tangent, curve), BEGINNING)
+    near = Sample(replace(start, arclength=sample.point.arclength))
+    test = event.test.within(near, near)
+    return zero_along(near.point, test.value, newton, _BESIDE, event.slope, factor=start.factor)
+
+
+def _crossing(event: LocatedEvent, curve: MotionProblem, u: Array) -> Sample:
+    """Where curves cross beside u, by equations that are regular there, as those of the curve are not, with the
+    direction of the curve, which its own equations do not tell there; raises ConvergenceError.
     """
-    point, curve = sample.point, sample.curve
-    with suppress(ConvergenceError, np.linalg.LinAlgError):
-        u = crossing_point(curve, point.u, point.weights)
-        along = point.tangent if chord is None else chord / length(point.weights * chord)
-        return sample.at(replace(point, u=u, tangent=along, evaluation=curve.evaluate(u), factor=None))
-    return sample
+    point = event.sample.point
+    weights = curve.weights(u, point.curve.size(point.u))
+    chord = event.chord()
+    along = curve.transfer(point.tangent if chord is None else chord, point.curve)
+    try:
+        u = crossing_point(curve, u, weights)
+    except np.linalg.LinAlgError as singular:
+        raise ConvergenceError(f"no crossing of curves was found beside {curve.where(u)}") from singular
+    tangent = along / length(weights * along)
+    return event.sample.at(
+        replace(point, curve=curve, u=u, tangent=tangent, weights=weights, evaluation=curve.evaluate(u), factor=None)
+    )
 
 
 def as_event(event: LocatedEvent, method: StabilityMethod, observe: int) -> TrackedEvent:
@@ -504,11 +513,16 @@ class _Step(Interior):
 
     @property
     def corner(self) -> bool:
-        """Whether limit points turn back where a contact grazes: as at a cusp in both parameters, but abruptly."""
+        """Whether limit points turn where a contact grazes, in either parameter, or in both as at a cusp, but abruptly:
+        the function of cusps, by which smooth turns are told, jumps there.
+        """
         if not self.steps.cusped:
             return False
-        pairs = itertools.pairwise(self.inside)
-        return any(all(p.slopes[n] * q.slopes[n] < 0.0 for n in p.slopes) and self.steps.grazes(p, q) for p, q in pairs)
+
+        def turn(p: Sample, q: Sample) -> bool:
+            return p.bend * q.bend < 0.0 or any(p.slopes[n] * q.slopes[n] < 0.0 for n in p.slopes)
+
+        return any(turn(p, q) and self.steps.grazes(p, q) for p, q in itertools.pairwise(self.inside))
 
     def measures(self, sample: Sample) -> Array:
         return self.steps.functions(sample)

@@ -17,7 +17,7 @@ from suboctave.curves.measures import bounded
 from suboctave.curves.motion import CRITICAL_EVERY, MotionProblem
 from suboctave.curves.sample import Sample
 from suboctave.curves.trace import Settings, Trace, TrackedPoint
-from suboctave.curves.tracked.corners import beyond_corner
+from suboctave.curves.tracked.corners import beyond_corner, grazes
 from suboctave.curves.tracked.ends import (
     End,
     comes_close,
@@ -82,8 +82,11 @@ class _Tracker(Driver):
 
     def _marching(self, start: CurvePoint) -> March:
         """Along the tangent of a point; closed where it comes back to the first one."""
-        options = (self.settings.newton, self.settings.stepping, self._clear)
-        return March(start, 0.0, self.bounds, *options, home=self.home, others=self.others)
+        newton, stepping = self.settings.newton, self.settings.stepping
+        return March(
+            start, 0.0, self.bounds, newton, stepping, self._clear, left_to_others=grazes, home=self.home,
+            others=self.others,
+        )  # fmt: skip
 
     def _walk(self) -> None:
         trace = self.trace
@@ -289,8 +292,10 @@ class _Tracker(Driver):
         """The second of two neighbours with the direction in which the curve comes to it.
 
         On the end of a range a coefficient may have a corner (a gap that is just closed): derivatives there may be
-        those of the far side.
+        those of the far side. Behind a corner that is passed they are.
         """
+        if self.watch.grazes(a, b):
+            return b
         point, angle = b.point, self.settings.stepping.sharpest
         if cosine(b.curve.transfer(a.point.tangent, a.curve), point.tangent, point.weights) > math.cos(angle):
             return b

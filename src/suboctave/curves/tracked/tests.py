@@ -137,14 +137,19 @@ class Extremum(CurveTest):
         # at a cusp it vanishes as well; the same all along a parameter that stays as it is
         if stands(sample, self.name):
             return 1.0, _logarithm(_LEVEL)
-        slope = sample.slopes[self.name]
+        slope = _slope(sample, self.name)
         return math.copysign(1.0, slope), _logarithm(slope)
+
+
+def _slope(sample: Sample, name: str) -> float:
+    """Component of the tangent along a parameter, in units of the oscillation: it does not vanish with that."""
+    return sample.slopes[name] / sample.oscillation if sample.oscillation > 0.0 else sample.slopes[name]
 
 
 def stands(sample: Sample, name: str) -> bool:
     """Whether a parameter stays as it is along the curve but for rounding."""
     weight = float(sample.point.weights[sample.curve.index(name)])
-    return abs(sample.slopes[name] * weight) < _LEVEL
+    return abs(_slope(sample, name) * weight) < _LEVEL
 
 
 @dataclass(frozen=True)
@@ -225,7 +230,9 @@ class CurvesCross(CurveTest):
             return self._determinant(sample)
         # what more harmonics do to a determinant is no matter of the motion; the parameter turns where it vanishes, too
         _, size = symmetric_functions(sample.others)[:, 0].tolist()
-        return sample.point.orientation, size - _logarithm(sample.slopes[sample.curve.name])
+        # the square of the oscillation is in them where cycles shrink to an equilibrium
+        size -= _logarithm(sample.oscillation) + _logarithm(_slope(sample, sample.curve.name))
+        return sample.point.orientation, size
 
     def genuine(self, sample: Sample) -> bool:
         """See `CurveTest.genuine`; raises ConvergenceError where no curves cross."""
