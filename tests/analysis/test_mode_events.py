@@ -183,3 +183,35 @@ def test_what_is_refused(crossings):
     (last,) = (e for e in crossings.extrema if e.parameter_name == "k")
     with pytest.raises(so.InputError, match="lies on a curve of events of nonlinear modes"):
         so.sensitivity(last)
+
+
+def resonant(stiffness: float) -> so.System:
+    """Two masses with a spring of all powers between them, the second `stiffness` times as stiff."""
+    force = "0.5*(x-y)**3 - 0.3*(x-y)**2"
+    return so.System.from_equations([f"x'' + x + 0.1*x**3 + {force} = 0", f"y'' + {stiffness}*y - ({force}) = 0"], {})
+
+
+def test_a_mode_ends_where_it_meets_another_of_twice_its_frequency_and_goes_on_beyond():
+    """Behind the meeting the same motions followed once more, half a period later, down to rest."""
+    mode = so.nonlinear_mode(resonant(4.6), amplitude=3.0)
+    assert [item.kind for item in mode.bifurcations] == ["extremum", "BP"]
+    meeting = mode.bifurcations["BP"][0]
+    assert "motions of half the period" in mode.ended
+    assert np.abs(meeting.orbit.x[[1, 2, 5, 6]]).max() < 1e-9
+    assert mode.points[-1].orbit.omega == pytest.approx(meeting.omega, abs=1e-12)
+    assert so.verify(meeting).agrees
+    # in a symmetric system two directions lead away there besides that of the other mode
+    assert np.abs(so.switch_branch(meeting, 1).harmonic(1)).max() < 1e-6
+    # the other mode has a second crossing, from which the first one goes on
+    other = so.switch_branch(meeting)
+    beyond = so.switch_branch(min(other.bifurcations["BP"], key=lambda item: item.omega))
+    assert beyond.ended.startswith("reached the end of the range")
+    assert beyond.omega.max() > 1.5
+
+
+def test_where_a_contact_begins_to_touch_omega_of_a_mode_does_not_turn():
+    stops = [so.ElasticStop(dof=0, stiffness=4.0, gap=0.26, side="right")]
+    for max_step in (None, 0.04, 0.03, 0.02):
+        mode = so.nonlinear_mode(so.System(np.eye(2), np.zeros((2, 2)), [[2, -1], [-1, 2]], stops), 2, amplitude=1.0,
+                                 max_step=max_step)  # fmt: skip
+        assert not mode.bifurcations["extremum"]

@@ -37,6 +37,8 @@ from suboctave.results.branch import TrackedBranch
 from suboctave.results.modes import tracked_class
 
 Range = tuple[float, float]
+#: share of odd harmonics up to which a motion may have half the period
+_FAINT = 1e-3
 
 
 def leaves_free_phase(item: Bifurcation) -> bool:
@@ -156,10 +158,28 @@ def _crossing(item: TrackedEvent, curve: MotionProblem, u: Array) -> Array:
     known, own = np.array(item.tangent), item.orbit.basis
     motion = known[: own.size * curve.balance.size].reshape(own.size, -1)
     tangent = np.concatenate((own.resized(motion, basis).ravel(), known[motion.size :]))
-    direction = other_direction(curve, u, weights, tangent)
+    direction = _of_half_the_period(curve, u, weights, tangent)
+    if direction is None:
+        direction = other_direction(curve, u, weights, tangent)
     scaled = weights * direction
     leading = scaled[-1] if abs(scaled[-1]) > 1e-3 else scaled[int(np.argmax(np.abs(scaled[:-1])))]
     return math.copysign(1.0, leading) * direction
+
+
+def _of_half_the_period(curve: MotionProblem, u: Array, weights: Array, tangent: Array) -> Array | None:
+    """The direction of motions of half the period where a curve runs into them, None where it does not.
+
+    In symmetric systems two more directions may lead away there, which differ by the phase of what vanishes: among the
+    even harmonics there is one.
+    """
+    numbers = np.repeat((np.arange(curve.balance.basis.size) + 1) // 2, curve.balance.size)
+    odd = np.append(numbers % 2 == 1, np.zeros(len(u) - len(numbers), dtype=bool))
+    size, known = length(weights * u), length(weights * tangent)
+    if length((weights * u)[odd]) > _FAINT * size or length((weights * tangent)[odd]) < 0.5 * known:
+        return None
+    direction = np.zeros(len(u))
+    direction[~odd] = np.linalg.svd(curve.evaluate(u).jacobian[:, ~odd] / weights[~odd])[2][-1] / weights[~odd]
+    return direction
 
 
 def _doubled(item: TrackedEvent, curve: MotionProblem, u: Array) -> Array:

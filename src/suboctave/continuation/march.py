@@ -289,7 +289,8 @@ class March:
                     fine = fine and _leaving(point, new) is new
                     fine = fine and (self.inspect is None or self.inspect(point, new))
                 if fine:
-                    return (_leaving(point, new) if step <= options.min_step else new), solved.distance, turn
+                    beyond = _leaving(point, new) if step <= options.min_step else new
+                    return beyond, solved.distance if beyond is new else 0.0, turn
                 failure = ConvergenceError("the curve turns too sharply")
             except ConvergenceError as error:
                 failure = error

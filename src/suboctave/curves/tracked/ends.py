@@ -11,6 +11,9 @@
 - LP of doubled motions: the doubled part vanishes, on a curve of period doublings of the parent motion, at a GPD. In
   the basis of the doubled period every period doubling of the parent solves the equations of a limit point, so that a
   tracker would slide on along them: J at the parent is block diagonal, J_0 and J_half.
+- Motions of a free phase: the oscillation vanishes, in a Hopf point; or all its odd harmonics do, on a curve of motions
+  of half the period, as where a mode meets another one of 2, 4, 6 times its frequency. Behind it the same motions
+  follow, half a period later. (Of 3 or 5 times they are others: the curve goes on.)
 """
 
 from __future__ import annotations
@@ -37,8 +40,8 @@ from suboctave.curves.kinds.limit_cycle import LimitCycle, oscillating
 from suboctave.curves.kinds.singular import SingularOperator
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.sample import Sample
-from suboctave.curves.tracked.events import LocatedEvent, nearest_point, zero_along
-from suboctave.curves.tracked.tests import CurveTest, DoubleMultiplier, GeneralisedDoubling
+from suboctave.curves.tracked.events import LocatedEvent, located, nearest_point, zero_along
+from suboctave.curves.tracked.tests import CurvesCross, CurveTest, DoubleMultiplier, GeneralisedDoubling
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.orbit import PeriodicOrbit
@@ -100,7 +103,7 @@ def end_between(a: Sample, b: Sample, newton: NewtonOptions, lopsided: bool = Tr
             f"{b.where}, the symmetry that forces them is broken there"
         )
     if augmentation.free_phase and vanished(a, b):
-        return _in_its_parent(a, b)
+        return _in_its_parent(a, b, newton)
     target = resonant_between(a, b)
     if target is not None:
         return _resonance(a, target == 0.5, newton)
@@ -128,25 +131,40 @@ def end_between(a: Sample, b: Sample, newton: NewtonOptions, lopsided: bool = Tr
 
 
 def vanished(a: Sample, b: Sample) -> bool:
-    """Whether what makes the motions those of their family, an oscillation or its doubled part, has passed zero between
-    two neighbours: behind it they are the same once more, half a period later.
+    """Whether the oscillation of motions of a free phase, or all that is odd in it, has passed zero between two
+    neighbours: behind it they are the same once more, half a period later.
     """
-    one, other = (_own_part(sample) for sample in (a, b))
-    size = min(len(one), len(other))
-    return float(np.vdot(one[:size], other[:size])) < 0.0
+    return any(_turned_over(a, b))
 
 
-def _own_part(sample: Sample) -> Array:
-    """The coefficients that a Hopf point, or the parent of doubled motions, does not have."""
-    part = oscillating(sample.state)
-    if sample.state.basis.nu % 2 == 0:
-        part[3::4], part[4::4] = 0.0, 0.0
-    return part
+def _turned_over(a: Sample, b: Sample) -> tuple[bool, bool]:
+    """Whether an oscillation is the other way round at the second of two neighbours, and whether its odd harmonics are,
+    where there are any: those of motions of half the period are none.
+    """
+    (whole, odd), others = (_oscillation(sample) for sample in (a, b))
+    size = min(len(whole), len(others[0]))
+    turned = [float(np.vdot(one[:size], other[:size])) < 0.0 for one, other in zip((whole, odd), others, strict=True)]
+    return turned[0], turned[1] and length(odd) > _NO_PARITY * length(whole)
 
 
-def _in_its_parent(a: Sample, b: Sample) -> End:
-    if b.state.basis.nu % 2 == 0:
-        return End(f"the doubled part of the motions vanishes between {a.where} and {b.where}: in a period doubling")
+def _oscillation(sample: Sample) -> tuple[Array, Array]:
+    """The coefficients of a motion but its mean, and the odd ones alone."""
+    whole = oscillating(sample.state)
+    odd = whole.copy()
+    odd[3::4], odd[4::4] = 0.0, 0.0
+    return whole, odd
+
+
+def _in_its_parent(a: Sample, b: Sample, newton: NewtonOptions) -> End:
+    if not _turned_over(a, b)[0]:
+        if b.state.basis.nu % 2 == 0:
+            return End(
+                f"the doubled part of the motions vanishes between {a.where} and {b.where}: in a period doubling"
+            )
+        reason = f"the odd harmonics vanish between {a.where} and {b.where}: the BP there lies among motions of half the period"
+        with suppress(ConvergenceError):
+            return End(reason, located(CurvesCross(), a, b, newton), last=True)
+        return End(reason)
     if a.curve.augmentation.turning:
         return End(f"the oscillation vanishes between {a.where} and {b.where}: in a generalised Hopf (Bautin) point")
     if a.curve.augmentation.name != LimitCycle.name:
@@ -375,7 +393,7 @@ def points_before(end: End, a: Sample, newton: NewtonOptions) -> list[Sample]:
     The parameters p run like p_end + c z^2 + d z^4 towards it, z the size of the doubled part of limit points, or the
     distance of kappa from a resonance.
     """
-    if end.event is None or a.curve.augmentation.turning:
+    if end.event is None or a.curve.augmentation.turning or isinstance(end.event.test, CurvesCross):
         return []
     points: list[Sample] = []
     last = end.event.sample.point.u[-2:]

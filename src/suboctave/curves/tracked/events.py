@@ -20,7 +20,14 @@ from suboctave.bifurcation.gaps import GrazingContact, levels
 from suboctave.continuation.events import Bracket
 from suboctave.continuation.linear import Factor, length
 from suboctave.continuation.newton import NewtonOptions, correct, null_row
-from suboctave.continuation.point import CurvePoint, make_point, point_between, solved_again
+from suboctave.continuation.point import (
+    CurvePoint,
+    crossing_matrix,
+    make_point,
+    point_ahead,
+    point_between,
+    solved_again,
+)
 from suboctave.continuation.problem import Array
 from suboctave.curves.interior import Interior, Steps, contacts_between, unsettled
 from suboctave.curves.kinds.extremum import LimitPointExtremal
@@ -142,6 +149,10 @@ def zero_along(
 
 #: way along a curve, in scaled arclength, that more harmonics may move an event
 _BESIDE = 0.05
+#: second least singular value of a crossing matrix up to which a crossing is double but for little
+_DOUBLE = 1e-4
+#: way to either side of a turn at which a parameter moves
+_BESIDE_IT = 1e-4
 #: share of a step within which events coincide
 SAME = 5e-3
 #: share of a step to which an event is located, at once and where more harmonics are to follow
@@ -197,7 +208,29 @@ def events_between(
             events += [] if turn is None else [turn]
             warnings += [f"{test.kind} near {b.where}: {failure}"] if turn is None else []
     near = SAME * (samples[-1].place - samples[0].place)
+    crossings = [item for item in events if isinstance(item.test, CurvesCross)]
+    repeated = _repeated(crossings, near)
+    if repeated:
+        warnings.append(
+            f"near {repeated[0].sample.where} several curves all but cross in one place, as at the tip of a tongue of "
+            f"high order: one BP is listed for {1 + len(repeated)}"
+        )
+    events = [item for item in events if not any(item is r for r in repeated)]
     return sorted(_genuine(events, samples[-1].curve, near), key=lambda item: item.sample.place)
+
+
+def _repeated(crossings: list[LocatedEvent], near: float) -> list[LocatedEvent]:
+    """Crossings beside one that is double but for little: two directions lead away, and rounding decides the
+    orientation all around. Where motions become those of a k-th of the period, what holds the phase of the rest z
+    vanishes like z^(k - 2).
+    """
+    second = [float(np.linalg.svd(crossing_matrix(item.sample.point), compute_uv=False)[-2]) for item in crossings]
+    repeated = []
+    for item, own in zip(crossings, second, strict=True):
+        beside = [s for o, s in zip(crossings, second, strict=True) if abs(o.sample.place - item.sample.place) <= near]
+        if own > min(beside) and min(beside) < _DOUBLE:
+            repeated.append(item)
+    return repeated
 
 
 def located(test: CurveTest, low: Sample, high: Sample, newton: NewtonOptions) -> LocatedEvent | None:
@@ -232,7 +265,7 @@ def located(test: CurveTest, low: Sample, high: Sample, newton: NewtonOptions) -
             # it changes sign without vanishing, as c3 does in a corner
             return None
     sample, value = Sample(bracket.points[share]), bracket.values[share]
-    if not own.genuine(sample):
+    if not own.genuine(sample) or (own.still(same) != own.still(high) and _begins(own, sample, newton)):
         return None
     slope = last - first
     if 0.0 < share < 1.0:
@@ -245,6 +278,15 @@ def located(test: CurveTest, low: Sample, high: Sample, newton: NewtonOptions) -
     return LocatedEvent(
         own, sample, own.extreme(first or -slope, sample), bracket if finer else None, slope, ends=(same, high)
     )
+
+
+def _begins(test: CurveTest, at: Sample, newton: NewtonOptions) -> bool:
+    """Whether a parameter begins to move there that stood before, or comes to stand, instead of turning: as omega of a
+    mode does where a contact begins to touch.
+    """
+    with suppress(ConvergenceError):
+        return any(test.still(Sample(point_ahead(at.point, way, newton))) for way in (-_BESIDE_IT, _BESIDE_IT))
+    return False
 
 
 def _jumps(bracket: Bracket, little: float) -> bool:
@@ -536,4 +578,7 @@ class _Step(Interior):
         return Sample(point_between(self.old.point, self.new.point, fraction, self.steps.newton))
 
     def harmless(self, p: Sample, q: Sample, reason: str) -> bool:
-        return reason not in self.reasons or self.steps.tests[self.reasons.index(reason)].changed(p, q)
+        if reason not in self.reasons:
+            return True
+        test = self.steps.tests[self.reasons.index(reason)]
+        return test.changed(p, q) or test.still(p) != test.still(q)

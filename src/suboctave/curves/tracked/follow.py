@@ -131,20 +131,28 @@ class _Tracker(Driver):
     def _turn_at_corner(self, last: Sample, beyond: CurvePoint) -> None:
         """Parameters that run the other way behind a corner have an extremum in it, known as well as the corner is.
 
-        It stands for whatever turns on the last steps into it, where nothing tells one turn from another.
+        It stands for whatever turns on the last steps into it, where nothing tells one turn from another: what turned
+        there an odd number of times turned once.
         """
         middle = 0.5 * (last.point.arclength + beyond.arclength)
         events = self.trace.bifurcations
-        events[:] = [e for e in events if e.kind not in ("extremum", "CP") or middle - e.arclength > _CORNER]
+        beside = [e for e in events if e.kind in ("extremum", "CP") and middle - e.arclength <= _CORNER]
+        events[:] = [e for e in events if not any(e is known for known in beside)]
         for test in self.tests:
             if not isinstance(test, Extremum):
                 continue
             i = last.curve.index(test.name)
-            if last.point.tangent[i] * beyond.tangent[i] < 0.0:
-                turn = LocatedEvent(test, last, test.extreme(test.value(last), last))
-                event = as_event(turn, self.settings.stability, self.settings.observe)
-                width = abs(float(beyond.u[i] - last.point.u[i]))
-                events.append(replace(event, isola="", uncertainty=width, arclength=middle))
+            turned = [e for e in beside if e.kind == test.kind and e.parameter_name == test.name]
+            turns = last.point.tangent[i] * beyond.tangent[i] < 0.0
+            if turns == bool(len(turned) % 2):
+                continue
+            if turned and not turns:
+                events.append(turned[-1])
+                continue
+            turn = LocatedEvent(test, last, test.extreme(test.value(last), last))
+            event = as_event(turn, self.settings.stability, self.settings.observe)
+            width = abs(float(beyond.u[i] - last.point.u[i]))
+            events.append(replace(event, isola="", uncertainty=width, arclength=middle))
 
     def _clear(self, a: CurvePoint, b: CurvePoint) -> bool:
         """True if a step stays on its curve."""

@@ -97,6 +97,10 @@ class CurveTest(ABC):
         """Whether what was located is an event."""
         return True
 
+    def still(self, sample: Sample) -> bool:
+        """Whether the function is zero but for rounding, and may be all along a part of the curve."""
+        return False
+
     def extreme(self, before: float, at: Sample) -> str:
         """Whether a parameter that turns has a maximum or a minimum, empty for other events; before: the sign before
         it.
@@ -131,7 +135,10 @@ class Extremum(CurveTest):
         return "maximum" if rising > 0.0 else "minimum"
 
     def changed(self, a: Sample, b: Sample) -> bool:
-        return not (stands(a, self.name) and stands(b, self.name)) and super().changed(a, b)
+        return not (self.still(a) and self.still(b)) and super().changed(a, b)
+
+    def still(self, sample: Sample) -> bool:
+        return stands(sample, self.name)
 
     def smooth(self, sample: Sample) -> tuple[float, float]:
         # at a cusp it vanishes as well; the same all along a parameter that stays as it is
