@@ -161,7 +161,10 @@ def _in_its_parent(a: Sample, b: Sample, newton: NewtonOptions) -> End:
             return End(
                 f"the doubled part of the motions vanishes between {a.where} and {b.where}: in a period doubling"
             )
-        reason = f"the odd harmonics vanish between {a.where} and {b.where}: the BP there lies among motions of half the period"
+        reason = (
+            f"the odd harmonics vanish between {a.where} and {b.where}: the BP there lies among motions of "
+            "half the period"
+        )
         with suppress(ConvergenceError):
             return End(reason, located(CurvesCross(), a, b, newton), last=True)
         return End(reason)
