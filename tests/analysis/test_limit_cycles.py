@@ -234,3 +234,19 @@ def test_wrong_use_is_refused(rubbing):
     linear = so.System.from_equations("x'' - mu*x' + x = 0", {"mu": -0.5})
     with pytest.raises(so.ConvergenceError, match="the system is linear"):
         so.limit_cycles(so.equilibria(linear, "mu", (-1.0, 1.0)).bifurcations["Hopf"][0])
+
+
+def test_cycles_that_grow_without_bound_end_after_orders_of_magnitude():
+    """Where mu = 0.50643 / 0.344606 the nonlinear damping is gone; with the amplitude grows the frequency."""
+    text = [
+        "x'' + 0.082906*x' + 0.54873*x - mu*0.741153*x' + 0.50643*x**2*x' - 0.28776*x**3 + 0.380118*x**5"
+        " - 0.344606*x**2*x'*mu = 0"
+    ]
+    hopf = hopf_of(so.System.from_equations(text, {"mu": 0.0}), "mu", (-1.0, 2.0))
+    cycles = so.limit_cycles(hopf)
+    assert "grow without bound" in cycles.ended
+    assert not cycles.warnings
+    assert len(cycles) < 500
+    fastest = int(np.argmax(cycles.omega))
+    assert 1e3 < cycles.omega[fastest] / hopf.omega < 2e3
+    assert cycles.parameter("mu")[fastest] == pytest.approx(0.50643 / 0.344606, abs=1e-2)

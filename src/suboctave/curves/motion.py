@@ -142,8 +142,9 @@ class MotionProblem:
 
     balance
         Equations of motion in the present basis.
-    names, spans
-        The free parameters, "omega" first where it is one of them, and the widths of their ranges.
+    names, spans, unbounded
+        The free parameters, "omega" first where it is one of them, the widths of their ranges, and those without one,
+        which have the size of their values.
     omega
         Frequency, where it is not free.
     adaptive, tolerance
@@ -176,6 +177,7 @@ class MotionProblem:
     force: float = 1.0
     cache: dict[HarmonicBasis, HarmonicBalance] = field(default_factory=dict)
     held: Mapping[str, float] = field(default_factory=dict)
+    unbounded: frozenset[str] = frozenset()
     steps: int = 0
     erred: float = 0.0
 
@@ -274,8 +276,10 @@ class MotionProblem:
         np.divide(self.balance.column_weights, size, out=weights[:n])
         if self.augmentation.extras:
             weights[n : -len(self.names)] = 1.0 / self.augmentation.spans(self.split(u)[1] / self.balance.basis.nu)
-        for i, span in enumerate(self.spans, len(u) - len(self.names)):
-            weights[i] = 1.0 / (abs(u[i]) if self.augmentation.relative else span)
+        for i, (name, span) in enumerate(zip(self.names, self.spans, strict=True), len(u) - len(self.names)):
+            value = abs(u[i])
+            grown = max(span, value) if name in self.unbounded else span
+            weights[i] = 1.0 / (value if self.augmentation.relative else grown)
         return weights
 
     def unit(self, weights: Array) -> float:

@@ -39,6 +39,8 @@ _ANY = (-math.inf, math.inf)
 _JUMP = 2e-6
 #: growth of motions from that at the start after which they may grow for ever
 _GROWN = 1e4
+#: growth of the frequency, and speed of the other parameters in scaled arclength, at which they grow without bound, too
+_FASTER, _HARDLY = 1e3, 1e-3
 #: steps that need not come closer to the end of an NS curve
 _NEAR_END = 1e-3
 #: way before a corner, in scaled arclength, on which what turns there, or comes to it, is not told from it
@@ -220,7 +222,7 @@ class _Tracker(Driver):
         self.previous = new
         self._report(point)
         if self._grows(new):
-            detail = f"the motions grow without bound at {new.where}, where the parameters stand still: any size solves"
+            detail = f"the motions grow without bound at {new.where}, where the parameters stand still"
             return Ending(EndReason.NO_MEANING, new.where, detail)
         ahead = None if self.march.ending.reason is not EndReason.NOT_STARTED else end_ahead(a, new, settings.newton)
         if ahead is None:
@@ -229,12 +231,18 @@ class _Tracker(Driver):
         return Ending(EndReason.MOTIONS_END, detail=ahead.reason)
 
     def _grows(self, sample: Sample) -> bool:
-        """Whether motions without a load have grown by orders of magnitude where the parameters stand still."""
+        """Whether motions without a load have grown by orders of magnitude where the parameters stand still, or become
+        faster by orders of magnitude where those with a range hardly move.
+        """
         assert self.home is not None
-        curve, first = sample.curve, self.home
-        if not curve.augmentation.free_phase or curve.size(sample.point.u) < _GROWN * first.curve.size(first.u):
+        curve, first, point = sample.curve, self.home, sample.point
+        if not curve.augmentation.free_phase:
             return False
-        return all(stands(sample, name) for name in curve.names)
+        bounded = [curve.index(name) for name in curve.names if name not in curve.unbounded]
+        if bounded and sample.state.omega > _FASTER * Sample(first).state.omega:
+            return bool(np.all(np.abs(point.weights * point.tangent)[bounded] < _HARDLY))
+        grown = curve.size(point.u) > _GROWN * first.curve.size(first.u)
+        return grown and all(stands(sample, name) for name in curve.names)
 
     def _take(self, events: list[LocatedEvent]) -> None:
         settings, warnings = self.settings, self.trace.warnings

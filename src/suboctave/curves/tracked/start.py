@@ -92,10 +92,7 @@ def curve_through(
     adaptive: AdaptiveHarmonics | None = None,
     formulation: Formulation = BORDERED,
 ) -> tuple[MotionProblem, np.ndarray]:
-    """The curve of bifurcations in free parameters through one of them, and its u there, in a basis.
-
-    Parameters have the size of their ranges, where there are none that of their values.
-    """
+    """The curve of bifurcations in free parameters through one of them, and its u there, in a basis."""
     orbit = item.orbit
     widths = {**(item.context or {}).get("bounds", {})} if is_extremum(item) else {}
     widths |= ranges or {}
@@ -121,6 +118,7 @@ def curve_through(
         augmentation,
         # nothing but a motion of unit size measures one at rest
         reference=0.0 if force > 0.0 else 1.0,
+        unbounded=frozenset(names) - widths.keys(),
     )
     curve.force = max(force, curve.least_force(state))
     return curve, curve.join(x, np.array([item.parameter(name) for name in names]), extra)
