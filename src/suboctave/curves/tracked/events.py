@@ -49,6 +49,8 @@ from suboctave.harmonic.truncation import choose_harmonics
 BEGINNING = 1e-5
 #: way along a curve, in scaled arclength, that a zero may still be off by the last secant, and the first secant's least
 _AT_ZERO, _SECANT = 1e-10, 1e-6
+#: how many times as far as its slope tells a zero may lie
+_ABOUT = 10.0
 #: share of its first value from which on a function's secants are no rounding
 _ROUNDING = 1e-3
 #: shortest corrections towards a curve before a point of it is solved for
@@ -144,6 +146,9 @@ def zero_along(
         s, old, value_old, before = s - change, s, value, solved.u
         if abs(s) > reach:
             break
+    if slope * known < 0.0:
+        # the slope was not that of the zero: it lies about as far away, on whichever side
+        return zero_along(start, function, newton, _ABOUT * (abs(first / known) + _SECANT), 0.0, iterations, factor)
     raise ConvergenceError(f"no zero found beside {start.curve.where(start.u)}")
 
 
