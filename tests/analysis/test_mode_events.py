@@ -200,7 +200,6 @@ def test_a_mode_ends_where_it_meets_another_of_twice_its_frequency_and_goes_on_b
     assert np.abs(meeting.orbit.x[[1, 2, 5, 6]]).max() < 1e-9
     assert mode.points[-1].orbit.omega == pytest.approx(meeting.omega, abs=1e-12)
     assert so.verify(meeting).agrees
-    # in a symmetric system two directions lead away there besides that of the other mode
     assert np.abs(so.switch_branch(meeting, 1).harmonic(1)).max() < 1e-6
     # the other mode has a second crossing, from which the first one goes on
     other = so.switch_branch(meeting)

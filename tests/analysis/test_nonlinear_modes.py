@@ -306,7 +306,8 @@ def test_saved_and_read_again(tongue, tmp_path):
     for name in ("omega", "energy", "action", "damping_ratio", "stable"):
         assert np.array_equal(getattr(again, name), getattr(tongue, name))
     assert [b.kind for b in again.bifurcations] == [b.kind for b in tongue.bifurcations]
-    # what leaves one of its points is found from the file as well
+    # what leaves one of its points is found from the file as well: the upper mode, though by symmetry two more
+    # directions lead away there
     other = so.switch_branch(again.bifurcations["BP"][0])
     assert other.omega.min() < 1.2
 

@@ -11,7 +11,7 @@ from typing import Any
 import scipy
 
 from suboctave.continuation.linear import length
-from suboctave.continuation.newton import NewtonOptions, correct
+from suboctave.continuation.newton import NewtonOptions, closely, correct
 from suboctave.continuation.point import CurvePoint, between, make_point
 from suboctave.errors import ConvergenceError, InputError
 
@@ -88,7 +88,8 @@ class Bracket:
         beside = [(curve.transfer(p.u, p.curve), curve.transfer(p.tangent, p.curve)) for p in (low, high)]
         starts = [interpolated, *(beside if part <= 0.5 else beside[::-1]), interpolated]
         failure = ConvergenceError()
-        for (u, along), options in zip(starts, (*[self.newton] * 3, patient), strict=True):
+        # beside a corner the last digits tell on which side of it a point lies
+        for (u, along), options in zip(starts, (*[closely(self.newton)] * 3, patient), strict=True):
             missing = place - float(self._row @ (weights * u))
             guess = u + missing / float(self._row @ (weights * along)) * along
             try:

@@ -153,9 +153,9 @@ class March:
     finer
         Called with two neighbours; the discretisation of the curve in which the step has to be taken again, None as a
         rule.
-    left_to_others
-        Called with a point from which no tangent leads on; whether the parameter must not lead on either, as whoever
-        follows the curve knows better what lies behind that corner.
+    corner
+        Called with a point from which no tangent leads on; whether it lies at a corner that whoever follows the curve
+        knows how to pass, where the parameter would lead back.
     home
         A point already passed, in the direction of its tangent, at which the curve is closed; default: the start.
     others
@@ -170,7 +170,7 @@ class March:
     inspect: Callable[[CurvePoint, CurvePoint], bool] | None = None
     arrive: Callable[[CurvePoint, CurvePoint], Arrival | None] | None = None
     finer: Callable[[CurvePoint, CurvePoint], Curve | None] | None = None
-    left_to_others: Callable[[CurvePoint], bool] | None = None
+    corner: Callable[[CurvePoint], bool] | None = None
     home: CurvePoint | None = None
     others: Sequence[Range] = ()
     closed: bool = field(default=False, init=False)
@@ -340,9 +340,9 @@ class March:
         """A point beyond a corner of the equations, where no tangent leads on but the parameter does; as `_advance`.
 
         A corner is met where a coefficient has one: a gap tracked through zero, whose force at rest begins to change.
-        Raises the failure that led here if there is no solution close by, or where others know better.
+        Raises the failure that led here if there is no solution close by, or at such a `corner`.
         """
-        if self.left_to_others is not None and self.left_to_others(point):
+        if self.corner is not None and self.corner(point):
             raise failure
         curve, weights, index = point.curve, point.weights, point.curve.parameter
         heading = math.copysign(1.0, point.tangent[index])

@@ -143,8 +143,8 @@ class MotionProblem:
     balance
         Equations of motion in the present basis.
     names, spans, unbounded
-        The free parameters, "omega" first where it is one of them, the widths of their ranges, and those without one,
-        which have the size of their values.
+        The free parameters, "omega" first where it is one of them, the widths of their ranges, and those without one:
+        they have the size of their values, and at least that at the start.
     omega
         Frequency, where it is not free.
     adaptive, tolerance

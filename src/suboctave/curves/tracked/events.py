@@ -156,8 +156,8 @@ def zero_along(
 _BESIDE = 0.05
 #: second least singular value of a crossing matrix up to which a crossing is double but for little
 _DOUBLE = 1e-4
-#: way to either side of a turn at which a parameter moves
-_BESIDE_IT = 1e-4
+#: way to either side of a turn, in scaled arclength, at which a parameter that turns moves
+_ASIDE = 1e-4
 #: share of a step within which events coincide
 SAME = 5e-3
 #: share of a step to which an event is located, at once and where more harmonics are to follow
@@ -229,6 +229,8 @@ def _repeated(crossings: list[LocatedEvent], near: float) -> list[LocatedEvent]:
     orientation all around. Where motions become those of a k-th of the period, what holds the phase of the rest z
     vanishes like z^(k - 2).
     """
+    if len(crossings) < 2:
+        return []
     second = [float(np.linalg.svd(crossing_matrix(item.sample.point), compute_uv=False)[-2]) for item in crossings]
     repeated = []
     for item, own in zip(crossings, second, strict=True):
@@ -290,7 +292,7 @@ def _begins(test: CurveTest, at: Sample, newton: NewtonOptions) -> bool:
     mode does where a contact begins to touch.
     """
     with suppress(ConvergenceError):
-        return any(test.still(Sample(point_ahead(at.point, way, newton))) for way in (-_BESIDE_IT, _BESIDE_IT))
+        return any(test.still(Sample(point_ahead(at.point, way, newton))) for way in (-_ASIDE, _ASIDE))
     return False
 
 

@@ -39,8 +39,9 @@ _ANY = (-math.inf, math.inf)
 _JUMP = 2e-6
 #: growth of motions from that at the start after which they may grow for ever
 _GROWN = 1e4
-#: growth of the frequency, and speed of the other parameters in scaled arclength, at which they grow without bound, too
-_FASTER, _HARDLY = 1e3, 1e-3
+#: growth of the frequency and of motions, and speed of the parameters that have a range in scaled arclength, at which
+#: they do, too
+_FASTER, _LARGER, _HARDLY = 1e3, 10.0, 1e-3
 #: steps that need not come closer to the end of an NS curve
 _NEAR_END = 1e-3
 #: way before a corner, in scaled arclength, on which what turns there, or comes to it, is not told from it
@@ -84,11 +85,8 @@ class _Tracker(Driver):
 
     def _marching(self, start: CurvePoint) -> March:
         """Along the tangent of a point; closed where it comes back to the first one."""
-        newton, stepping = self.settings.newton, self.settings.stepping
-        return March(
-            start, 0.0, self.bounds, newton, stepping, self._clear, left_to_others=grazes, home=self.home,
-            others=self.others,
-        )  # fmt: skip
+        options = (self.settings.newton, self.settings.stepping, self._clear)
+        return March(start, 0.0, self.bounds, *options, corner=grazes, home=self.home, others=self.others)
 
     def _walk(self) -> None:
         trace = self.trace
@@ -238,11 +236,13 @@ class _Tracker(Driver):
         curve, first, point = sample.curve, self.home, sample.point
         if not curve.augmentation.free_phase:
             return False
+        growth = curve.size(point.u) / (first.curve.size(first.u) or 1.0)
+        if growth > _GROWN and all(stands(sample, name) for name in curve.names):
+            return True
         bounded = [curve.index(name) for name in curve.names if name not in curve.unbounded]
-        if bounded and sample.state.omega > _FASTER * Sample(first).state.omega:
-            return bool(np.all(np.abs(point.weights * point.tangent)[bounded] < _HARDLY))
-        grown = curve.size(point.u) > _GROWN * first.curve.size(first.u)
-        return grown and all(stands(sample, name) for name in curve.names)
+        if not bounded or growth < _LARGER or sample.state.omega < _FASTER * Sample(first).state.omega:
+            return False
+        return bool(np.all(np.abs(point.weights * point.tangent)[bounded] < _HARDLY))
 
     def _take(self, events: list[LocatedEvent]) -> None:
         settings, warnings = self.settings, self.trace.warnings
