@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -83,6 +85,19 @@ def test_what_has_no_peak_is_refused():
         so.track_peak(response, "alpa", (0.1, 0.3))
     third = so.track_peak(response, "F", (0.15, 0.25), harmonic=3)
     assert third.kind == "harmonic_ridge"
+    rising = so.frequency_response(system, (0.5, 0.9), harmonics=3)
+    with pytest.raises(so.InputError, match="largest at an end of the response, omega = 0.9, .* wider range$"):
+        so.track_peak(rising, "F", (0.15, 0.25))
+
+
+def test_a_response_that_is_highest_at_an_end_names_the_peak_inside_it():
+    response = so.frequency_response(so.library.nltva(F=0.05), (0.94, 1.2), harmonics=5)
+    heights = response.amplitude
+    assert np.argmax(heights) in (0, len(response) - 1)
+    with pytest.raises(so.InputError, match=r"give the point beside another peak: response.points\[(\d+)\]") as refused:
+        so.track_peak(response, "F", (0.04, 0.06))
+    place = int(re.search(r"points\[(\d+)\]", str(refused.value)).group(1))
+    assert heights[place - 1] < heights[place] > heights[place + 1]
 
 
 def test_twenty_responses_of_a_nonlinear_absorber_have_their_peaks_on_the_ridge():

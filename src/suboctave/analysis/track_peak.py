@@ -10,6 +10,7 @@ from suboctave.analysis.options import TrackOptions
 from suboctave.analysis.track import track
 from suboctave.curves.trace import BranchPoint
 from suboctave.errors import InputError, is_number, shortened
+from suboctave.harmonic.basis import Array
 from suboctave.model.inputs import timed
 from suboctave.options import with_options
 from suboctave.results.branch import Branch, TrackedBranch
@@ -54,8 +55,24 @@ def track_peak(
         if response.name != "omega" or not len(response):
             raise InputError("the peak is that of a response over omega: give such a branch, or one of its points")
         heights = response.amplitude if harmonic is None else np.abs(response.harmonic(harmonic))
-        start = response.points[int(np.argmax(heights))]
+        highest = int(np.argmax(heights))
+        if highest in (0, len(response) - 1) and not response.closed:
+            raise InputError(_at_an_end(response, heights, highest))
+        start = response.points[highest]
         if options.get("observe") is None:
             options["observe"] = response.observe
     onto: Any = "ridge" if harmonic is None else {"name": "harmonic_ridge", "harmonic": harmonic}
     return track(start, parameter, bounds, onto=onto, **options)
+
+
+def _at_an_end(response: Branch, heights: Array, end: int) -> str:
+    """What to do where the amplitude is largest at an end of a response."""
+    peaks = [i for i in range(1, len(heights) - 1) if heights[i - 1] < heights[i] > heights[i + 1]]
+    words = (
+        f"the amplitude is largest at an end of the response, omega = {response.omega[end]:.6g}, which is no peak: "
+        "follow it over a wider range"
+    )
+    if not peaks:
+        return words
+    best = max(peaks, key=lambda i: heights[i])
+    return f"{words}, or give the point beside another peak: response.points[{best}], at {response.omega[best]:.6g}"

@@ -13,6 +13,7 @@ import scipy
 from suboctave.continuation.linear import length
 from suboctave.continuation.newton import NewtonOptions, closely, correct
 from suboctave.continuation.point import CurvePoint, between, make_point
+from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError, InputError
 
 #: ratio of a function's values at two ends beyond which it does not change evenly
@@ -66,6 +67,11 @@ class Bracket:
     def way(self) -> float:
         """Its length in scaled arclength."""
         return self.points[1.0].arclength - self.points[0.0].arclength
+
+    def share(self, u: Array) -> float:
+        """The share of the way at which the plane across the chord goes through u."""
+        start, end = self._places
+        return (float(self._row @ (self.points[1.0].weights * u)) - start) / (end - start)
 
     def value(self, share: float) -> float:
         """The function at a share of the way; may raise ConvergenceError."""

@@ -1,5 +1,5 @@
-"""Events along a curve of bifurcations: steps whose interior is looked at, events bracketed between two neighbours,
-located, and located again with more harmonics.
+"""Events along a curve of bifurcations: bracketed between two neighbours, located, and located again with more
+harmonics.
 
 What is looked for are the sign changes of `tests`. At a cusp the curve turns in both parameters, which makes no
 extremum of either: there the tangent's components divided by the cusp's function keep their signs.
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -25,11 +25,10 @@ from suboctave.continuation.point import (
     crossing_matrix,
     make_point,
     point_ahead,
-    point_between,
     solved_again,
 )
 from suboctave.continuation.problem import Array
-from suboctave.curves.interior import Interior, Steps, contacts_between, unsettled
+from suboctave.curves.interior import contacts_between
 from suboctave.curves.kinds.extremum import LimitPointExtremal
 from suboctave.curves.kinds.grazing import GrazingEquations
 from suboctave.curves.kinds.limit_cycle import LimitCycle
@@ -37,11 +36,9 @@ from suboctave.curves.kinds.singular import OPERATORS, SingularOperator
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.other_branch import crossing_point
 from suboctave.curves.sample import Sample
-from suboctave.curves.trace import joined
-from suboctave.curves.tracked.tests import CurvesCross, CurveTest, Cusp, Extremum, PairCrossing
+from suboctave.curves.tracked.tests import CurvesCross, CurveTest, Cusp, Extremum
 from suboctave.errors import ConvergenceError
 from suboctave.floquet.methods import StabilityMethod
-from suboctave.floquet.symmetric import least_factor
 from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.truncation import choose_harmonics
 
@@ -196,17 +193,27 @@ class LocatedEvent:
 
 
 def events_between(
-    samples: list[Sample], tests: tuple[CurveTest, ...], newton: NewtonOptions, warnings: list[str]
+    samples: list[Sample],
+    tests: tuple[CurveTest, ...],
+    newton: NewtonOptions,
+    warnings: list[str],
+    crossing: LocatedEvent | None = None,
 ) -> list[LocatedEvent]:
-    """Every event in a step, between its samples in order (both ends included, no test changing twice in between).
+    """Every event in a step, between its samples in order (both ends included, no test changing twice in between);
+    `crossing`: one of curves that is known already.
 
     The first one's tests count in the discretisation it was found in, as on the step before: what changes sign there
     is not lost, nor found twice, if that of the others moves it across.
     """
     events: list[LocatedEvent] = []
     for test, (a, b) in itertools.product(tests, itertools.pairwise(samples)):
+        if not test.changed(a, b):
+            continue
+        if crossing is not None and isinstance(test, CurvesCross) and a.place <= crossing.sample.place <= b.place:
+            events.append(crossing)
+            continue
         try:
-            item = located(test, a, b, newton) if test.changed(a, b) else None
+            item = located(test, a, b, newton)
             events += [] if item is None else [item]
         except ConvergenceError as failure:
             turn = _turned(test, a, b)
@@ -255,13 +262,13 @@ def located(test: CurveTest, low: Sample, high: Sample, newton: NewtonOptions) -
             return None
         return LocatedEvent(own, sample, own.extreme(-slope, sample), None, slope, ends=(same, high))
     bracket = Bracket(same.point, high.point, (first, last), lambda point: own.value(Sample(point)), newton)
-    # whether curves cross is known at the crossing itself
-    precisely = isinstance(own, CurvesCross)
+    if isinstance(own, CurvesCross):
+        return _crossing_in(bracket, LocatedEvent(own, high, ends=(same, high)))
     little = _JUMP * min(abs(first), abs(last))
     # on a curve of extrema those that others bring about are known by their distance; multipliers tell only close by
     apart = high.curve.augmentation.turning or type(own).genuine is not CurveTest.genuine or isinstance(own, Extremum)
     try:
-        share = bracket.zero(_RESOLVED if precisely else _ROUGH)
+        share = bracket.zero(_ROUGH)
     except ConvergenceError:
         if apart or not _jumps(bracket, little):
             raise
@@ -285,6 +292,23 @@ def located(test: CurveTest, low: Sample, high: Sample, newton: NewtonOptions) -
     return LocatedEvent(
         own, sample, own.extreme(first or -slope, sample), bracket if finer else None, slope, ends=(same, high)
     )
+
+
+def _crossing_in(bracket: Bracket, event: LocatedEvent) -> LocatedEvent:
+    """An event at which curves cross in a bracket: by equations that are regular there, from as near as they need.
+    Raises ConvergenceError, also where none cross.
+    """
+    for resolved in (_ROUGH, _RESOLVED):
+        point = bracket.points[bracket.zero(resolved)]
+        event = replace(event, sample=Sample(point))
+        with suppress(ConvergenceError):
+            sample = _crossing(event, event.sample.curve, point.u)
+            share = bracket.share(sample.point.u)
+            if 0.0 <= share <= 1.0:
+                arclength = point.arclength + (share - bracket.share(point.u)) * bracket.way
+                return replace(event, sample=sample.at(replace(sample.point, arclength=arclength)))
+    event.test.genuine(event.sample)
+    return event
 
 
 def _begins(test: CurveTest, at: Sample, newton: NewtonOptions) -> bool:
@@ -381,9 +405,6 @@ def refined(event: LocatedEvent, newton: NewtonOptions, warnings: list[str]) -> 
                     event = replace(event, off=_ROUGH * event.rough.way)
             warnings.append(words)
             break
-    if isinstance(event.test, CurvesCross) and sample is event.sample:
-        with suppress(ConvergenceError):
-            sample = _crossing(event, sample.curve, sample.point.u)
     return event if sample is event.sample else replace(event, sample=sample)
 
 
@@ -473,119 +494,3 @@ def _isola(event: LocatedEvent) -> str:
     (beside,) = set(curve.names) - {event.test.name}
     extremal = LimitPointExtremal(base, beside, 1.0, event.test.name)
     return extremal.at(sample.state, sample.evaluation.extra, curve.names).isola
-
-
-class StepWatch(Steps):
-    """Looks at the steps of a curve in order, for the events that `tests` tell of."""
-
-    reach = 3
-
-    def __init__(self, tests: tuple[CurveTest, ...], newton: NewtonOptions) -> None:
-        super().__init__()
-        self.tests = tests
-        self.newton = newton
-        #: whether limit points may turn back abruptly
-        self.cusped = any(isinstance(test, Cusp) for test in tests)
-        #: the functions of the tests at the last points
-        self._functions: dict[Sample, Array] = {}
-        self._last: _Step | None = None
-
-    def refuses(self, a: Sample, b: Sample) -> bool:
-        """Whether a step has gone over to another curve."""
-        return self._examined(a, b).refused
-
-    def _examined(self, a: Sample, b: Sample) -> _Step:
-        if self._last is None or self._last.old is not a or self._last.new is not b:
-            self._last = step = _Step(self, a, b)
-            if step.size > 0.0:
-                step.look()
-        return self._last
-
-    def passed(self, a: Sample, b: Sample, warnings: list[str]) -> list[LocatedEvent]:
-        """The events between two neighbours, in the order met."""
-        step = self._examined(a, b)
-        warnings += [f"{stretch}: a smaller max_step may tell" for stretch in joined(step.unsettled)]
-        self.keep(step.samples)
-        self._functions = {s: known for s, known in self._functions.items() if s in self._behind}
-        # parameters turn in a corner, see `follow`; the function of cusps jumps there
-        tests = tuple(test for test in self.tests if not (step.corner and isinstance(test, Extremum | Cusp)))
-        return events_between(step.inside, tests, self.newton, warnings)
-
-    def over_corner(self, a: Sample, b: Sample) -> bool:
-        """Whether limit points turn back abruptly in a step."""
-        return self._examined(a, b).corner
-
-    def parted(self, p: Sample, q: Sample) -> bool:
-        # determinants and null vectors belong to a discretisation
-        return p.curve.balance is not q.curve.balance or super().parted(p, q)
-
-    def functions(self, sample: Sample) -> Array:
-        """The functions of the tests that are smooth along the curve: see `Interior.measures`."""
-        known = self._functions.get(sample)
-        if known is None:
-            known = self._functions[sample] = np.array([test.smooth(sample) for test in self.tests]).T
-        return known
-
-
-class _Step(Interior):
-    """One step of a tracked curve under examination.
-
-    Where the harmonics have changed, the first sample is there twice, and the step is looked at from the second one on,
-    that of the new harmonics. Events are those between the first and the others, see `events_between`.
-    """
-
-    steps: StepWatch
-
-    def __init__(self, steps: StepWatch, old: Sample, new: Sample) -> None:
-        super().__init__(steps, old, new, [f"two {test.kind} may lie" for test in steps.tests])
-        self.start = old
-        with suppress(ConvergenceError):
-            self.start = same_discretisation(old, new, steps.newton)
-        if self.start is not old:
-            self.samples.insert(self.first + 1, self.start)
-
-    @property
-    def inside(self) -> list[Sample]:
-        known = self.samples[self.first :]
-        return known if self.start is self.old else [self.old, *known[2:]]
-
-    def look(self) -> None:
-        """Examine all of it."""
-        self.examine([(self.start, self.new)])
-        first, again, second = self.old, self.start, self.inside[1]
-        for test, reason in zip(self.steps.tests, self.reasons, strict=True):
-            if again is not first and test.changed(first, again) and test.changed(again, second):
-                # of a pair that the change of harmonics may have brought about, or hidden, nothing is seen
-                self.unsettled.append(unsettled(first, second, reason))
-        # not over a corner, if it can be halved
-        self.refused = self.refused or self.corner
-
-    @property
-    def corner(self) -> bool:
-        """Whether limit points turn where a contact grazes, in either parameter, or in both as at a cusp, but abruptly:
-        the function of cusps, by which smooth turns are told, jumps there.
-        """
-        if not self.steps.cusped:
-            return False
-
-        def turn(p: Sample, q: Sample) -> bool:
-            return p.bend * q.bend < 0.0 or any(p.slopes[n] * q.slopes[n] < 0.0 for n in p.slopes)
-
-        return any(turn(p, q) and self.steps.grazes(p, q) for p, q in itertools.pairwise(self.inside))
-
-    def measures(self, sample: Sample) -> Array:
-        return self.steps.functions(sample)
-
-    def relative(self, stencil: Sequence[Sample], k: int) -> Iterator[Array]:
-        """See `Interior.relative`: with the least factor of `torus`."""
-        if isinstance(self.steps.tests[k], PairCrossing):
-            yield np.array([least_factor(sample.others) for sample in stencil])
-
-    def solve(self, fraction: float) -> Sample:
-        return Sample(point_between(self.old.point, self.new.point, fraction, self.steps.newton))
-
-    def harmless(self, p: Sample, q: Sample, reason: str) -> bool:
-        if reason not in self.reasons:
-            return True
-        test = self.steps.tests[self.reasons.index(reason)]
-        return test.changed(p, q) or test.still(p) != test.still(q)

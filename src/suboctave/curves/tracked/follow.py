@@ -28,9 +28,10 @@ from suboctave.curves.tracked.ends import (
     rebased,
     vanished,
 )
-from suboctave.curves.tracked.events import LocatedEvent, StepWatch, as_event, events_between, located, refined
+from suboctave.curves.tracked.events import LocatedEvent, as_event, events_between, refined
 from suboctave.curves.tracked.start import Ranges
-from suboctave.curves.tracked.tests import CurvesCross, Extremum, stands, tests_of
+from suboctave.curves.tracked.tests import Extremum, stands, tests_of
+from suboctave.curves.tracked.watch import StepWatch
 from suboctave.errors import ConvergenceError
 
 #: range of a parameter that is not bounded
@@ -159,16 +160,17 @@ class _Tracker(Driver):
         way = b.arclength - a.arclength
         assert isinstance(b.curve, MotionProblem)
         free = b.curve.augmentation.free_phase
-        if b.orientation != a.orientation and way > _JUMP and not (free and self._crossed(Sample(b))):
+        old, new = Sample(a), Sample(b)
+        if b.orientation != a.orientation and way > _JUMP and not (free and self._crossed(new)):
             return False
-        if way > _NEAR_END and not comes_close(Sample(a), Sample(b)):
+        if way > _NEAR_END and not comes_close(old, new):
             return False
-        if not (keeps_subharmonics(a, b) or (free and vanished(Sample(a), Sample(b)))):
+        if not (keeps_subharmonics(a, b) or (free and vanished(old, new))):
             return False
         last = self.previous
         if last is None or last.place != a.arclength:
             return True
-        self._candidate = new = Sample(b)
+        self._candidate = new
         return not self.watch.refuses(last, new)
 
     def _crossed(self, b: Sample) -> bool:
@@ -176,12 +178,7 @@ class _Tracker(Driver):
         motions shrink to nothing; else the step has gone over to another curve, or back.
         """
         a = self.previous
-        if a is None or vanished(a, b):
-            return True
-        try:
-            return located(CurvesCross(), a, b, self.settings.newton) is not None
-        except ConvergenceError:
-            return False
+        return a is None or vanished(a, b) or self.watch.crossing(a, b) is not None
 
     def _accept(self, point: CurvePoint) -> Ending | None:
         """Take a point in; why the curve ends there or before it, if it does."""
