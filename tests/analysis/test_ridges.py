@@ -86,7 +86,7 @@ def test_what_has_no_peak_is_refused():
     third = so.track_peak(response, "F", (0.15, 0.25), harmonic=3)
     assert third.kind == "harmonic_ridge"
     rising = so.frequency_response(system, (0.5, 0.9), harmonics=3)
-    with pytest.raises(so.InputError, match="largest at an end of the response, omega = 0.9, .* wider range$"):
+    with pytest.raises(so.InputError, match=r"largest at an end of the response, omega = 0.9, .* wider range$"):
         so.track_peak(rising, "F", (0.15, 0.25))
 
 
