@@ -191,3 +191,20 @@ def test_what_turns_in_a_corner_turns_there_once_whatever_the_steps(systems, cur
     left = [known for others in at.values() for known in others]
     assert len(left) == (3 if seed == 700 else 0)
     assert np.ptp([known[1] for known in left] or [0.0]) < 1e-6
+
+
+def test_a_generalised_doubling_of_exact_stops_says_how_far_it_may_be_off(systems):
+    """c3 converges like 1 / H, to and fro."""
+    described = systems.describe(729, strong=True)
+    amplitude = described["loads"][0]["amplitude"]
+    described["loads"][0]["amplitude"] = "F"
+    response = so.frequency_response(systems.system_of(described, {"F": amplitude}), tuple(described["omega"]))
+    border = so.track(response.bifurcations["PD"][0], "F", (0.6 * amplitude, 1.2 * amplitude))
+    found = border.bifurcations["GPD"]
+    # with 159 to 255 harmonics
+    known = [(0.6834029, 0.6833450, 0.6833616, 0.6833803), (1.0976259, 1.0978219, 1.0976892, 1.0977142)]
+    assert len(found) == 2
+    for item, values in zip(sorted(found, key=lambda one: one.parameter("F")), known, strict=True):
+        share = item.parameter("F") / amplitude
+        assert max(abs(share - value) for value in values) < 3.0 * item.uncertainty / amplitude
+        assert 1e-6 < item.uncertainty / amplitude < 1e-3

@@ -93,3 +93,16 @@ def test_an_exact_zero_at_the_start_is_an_event_of_one_direction(odd, ahead):
     assert (forward, back).count(True) == 1
     # passed on the way it is met once
     assert [Given().changed(-ahead, 0.0), Given().changed(0.0, ahead)].count(True) == 1
+
+
+def test_a_generalised_doubling_is_as_far_off_as_it_says():
+    """Short contacts enter c3 by the third derivative: harmonics that do for the motion do not for its zero."""
+    # with 127 to 255 harmonics
+    known = [(2.155679737, 0.1506546186), (2.036400694, 0.1747234666)]
+    found = doublings().bifurcations["GPD"]
+    for item in found:
+        omega, j = min(known, key=lambda one: abs(one[0] - item.omega))
+        assert abs(item.parameter("j") - j) <= max(item.uncertainty, 3e-7)
+        assert abs(item.omega - omega) < 1e-6
+        assert item.uncertainty < 1e-5
+    assert len(found) == 2

@@ -40,7 +40,7 @@ from suboctave.curves.tracked.tests import CurvesCross, CurveTest, Cusp, Extremu
 from suboctave.errors import ConvergenceError
 from suboctave.floquet.methods import StabilityMethod
 from suboctave.harmonic.basis import HarmonicBasis
-from suboctave.harmonic.truncation import choose_harmonics
+from suboctave.harmonic.truncation import choose_harmonics, next_harmonics
 
 #: way in scaled arclength within which derivatives count as those of a point that a search begins at
 BEGINNING = 1e-5
@@ -161,6 +161,8 @@ SAME = 5e-3
 _RESOLVED, _ROUGH = 1e-11, 1e-3
 #: share of a test's values at the ends of a step above which one that has been resolved jumps instead of vanishing
 _JUMP = 0.5
+#: with how many other numbers of harmonics an event is compared; way in scaled arclength by which one that stays moves
+_COMPARED, _STAYS = 3, 3e-7
 #: halvings of the way to a grazing from either side that show whether it does
 _CLOSER = 4
 
@@ -387,16 +389,13 @@ def refined(event: LocatedEvent, newton: NewtonOptions, warnings: list[str]) -> 
     sample = event.sample
     # what could not be located is not found with more
     for _ in range(6 if event.off == 0.0 else 0):
-        curve, basis = sample.curve, _finer(sample)
+        basis = _finer(sample)
         if basis is None:
             break
         try:
             sample = _with_more(event, sample, basis, newton)
         except ConvergenceError as failure:
-            words = (
-                f"{event.test.kind} near {curve.where(sample.point.u)} was located with "
-                f"{curve.balance.basis.harmonics} harmonics; with {basis.harmonics} it was not found again ({failure})"
-            )
+            words = _lost(event, sample, basis, failure)
             if sample is event.sample and event.rough is not None:
                 try:
                     sample = Sample(event.rough.points[event.rough.zero(_RESOLVED)])
@@ -405,7 +404,48 @@ def refined(event: LocatedEvent, newton: NewtonOptions, warnings: list[str]) -> 
                     event = replace(event, off=_ROUGH * event.rough.way)
             warnings.append(words)
             break
-    return event if sample is event.sample else replace(event, sample=sample)
+    event = event if sample is event.sample else replace(event, sample=sample)
+    return _settled(event, newton, warnings) if event.test.of_third_order and event.off == 0.0 else event
+
+
+def _settled(event: LocatedEvent, newton: NewtonOptions, warnings: list[str]) -> LocatedEvent:
+    """An event that a coefficient of third order tells of, with more harmonics until it stays, as far as they go: from
+    contacts these converge like 1 / H, and unevenly. Else the larger of the last two moves is how far it may lie off.
+    """
+    moves: list[float] = []
+    fewest, rule = event.sample, event.sample.curve.adaptive
+    if rule is None:
+        return event
+    for _ in range(_COMPARED):
+        basis = next_harmonics(event.sample.state, rule)
+        more = basis.harmonics > event.sample.state.basis.harmonics
+        start = event.sample if more else fewest
+        if not more:
+            if len(moves) > 1:
+                break
+            nu, high = start.state.basis.nu, start.state.basis.harmonics
+            basis = HarmonicBasis(nu * math.ceil(high / (1.5 * nu)), nu)
+        try:
+            found = _with_more(event, start, basis, newton)
+        except ConvergenceError as failure:
+            warnings.append(_lost(event, start, basis, failure))
+            break
+        k = len(found.curve.names)
+        moves.append(length((found.point.u[-k:] - start.point.u[-k:]) * found.point.weights[-k:]))
+        if more:
+            event = replace(event, sample=found)
+            if moves[-1] <= _STAYS:
+                return event
+        else:
+            fewest = found
+    return replace(event, off=max(moves[-2:], default=0.0))
+
+
+def _lost(event: LocatedEvent, sample: Sample, basis: HarmonicBasis, failure: ConvergenceError) -> str:
+    return (
+        f"{event.test.kind} near {sample.where} was located with {sample.state.basis.harmonics} harmonics; with "
+        f"{basis.harmonics} it was not found again ({failure})"
+    )
 
 
 def _with_more(event: LocatedEvent, sample: Sample, basis: HarmonicBasis, newton: NewtonOptions) -> Sample:

@@ -71,6 +71,8 @@ class CurveTest(ABC):
     kind: str
     #: whether a crossing of curves that a symmetry brings about changes its sign as well
     at_crossings: bool = False
+    #: whether its function is a coefficient of third order, which converges more slowly than the motion
+    of_third_order: bool = False
 
     @abstractmethod
     def value(self, sample: Sample) -> float:
@@ -268,6 +270,7 @@ class GeneralisedDoubling(CurveTest):
     """The motions that branch off change sides; a curve of their limit points begins."""
 
     kind = "GPD"
+    of_third_order = True
 
     def value(self, sample: Sample) -> float:
         # at a fold-flip c3 passes through infinity, and det J_0 through zero
