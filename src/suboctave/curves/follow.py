@@ -17,7 +17,8 @@ from suboctave.continuation import CurvePoint, Event, March
 from suboctave.continuation.ending import Ending, EndReason
 from suboctave.continuation.events import Bracket
 from suboctave.continuation.march import Arrival
-from suboctave.continuation.point import point_between, solved_again
+from suboctave.continuation.newton import NewtonOptions
+from suboctave.continuation.point import point_ahead, point_between, solved_again
 from suboctave.curves.events.grazings import locate_grazings
 from suboctave.curves.events.layer import behind_their_grazings
 from suboctave.curves.events.monitors import (
@@ -47,6 +48,9 @@ from suboctave.interruption import Interruption
 _NOTHING = 1e-12
 #: cosine of two null vectors beyond which they are one
 _PARALLEL = 0.99
+#: speed of the free parameter along a curve, in scaled arclength, at which it turns; how far from there a curve begins
+#: that is followed both ways
+_TURNS, _BESIDE = 1e-2, 3e-3
 
 
 class Driver(ABC):
@@ -520,6 +524,7 @@ def both_ways(point: CurvePoint, ahead: float, bounds: tuple[float, float], sett
         back = follow(point, -ahead, bounds, settings)
         only = Trace(back.points[:1], endings=(Ending(EndReason.START), Ending(EndReason.START)))
         return back.reversed_before(only)
+    point = _beside_turn(point, bounds, settings.newton)
     forward = follow(point, ahead, bounds, settings)
     if forward.closed or forward.interrupted:
         return forward
@@ -530,3 +535,21 @@ def both_ways(point: CurvePoint, ahead: float, bounds: tuple[float, float], sett
     ends = [t.points[-1].orbit for t in (forward, back)]
     misses = [abs((o.omega if name == "omega" else o.values[name]) - target) for o in ends]
     return back.reversed_before(forward) if misses[0] <= misses[1] else forward.reversed_before(back)
+
+
+def _turning(point: CurvePoint) -> float:
+    """How fast the free parameter changes along a curve, in scaled arclength."""
+    return abs(float(point.weights[-1] * point.tangent[-1]))
+
+
+def _beside_turn(point: CurvePoint, bounds: tuple[float, float], newton: NewtonOptions) -> CurvePoint:
+    """A point beside one at which the parameter turns: a limit point right where two halves of a curve meet, or on the
+    seam of a closed one, lies in neither of them, or in both, once harmonics change.
+    """
+    if _turning(point) > _TURNS:
+        return point
+    beside = [point]
+    for way in (-_BESIDE, _BESIDE):
+        with suppress(ConvergenceError):
+            beside.append(replace(point_ahead(point, way, newton), arclength=point.arclength))
+    return max((one for one in beside if bounds[0] <= one.parameter <= bounds[1]), key=_turning, default=point)

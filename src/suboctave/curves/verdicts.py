@@ -54,11 +54,11 @@ def with_verdicts(trace: Trace, method: StabilityMethod, name: str) -> Trace:
         i
         for first, last in _runs(in_doubt)
         for i in range(first, last + 1)
-        if not _explained(points[i].floquet, points[max(first - 1, 0) : last + 2], known)
+        if not _explained(points[i].floquet, _reach(points, first, last, trace.closed), known)
     ]
     unsettled, notes = _stretches(points, open_ones, name)
     for probe in trace.open:
-        stretch = _between(probe, points, known, name)
+        stretch = _between(probe, points, known, name, trace.closed)
         if stretch is None:
             continue
         first, last = stretch.arclength
@@ -160,9 +160,19 @@ def _doubt_beside(item: Bifurcation) -> str | None:
     )
 
 
-def _explained(result: FloquetResult, points: Sequence[BranchPoint], bifurcations: Sequence[Bifurcation]) -> bool:
-    """Whether a bifurcation on the way along some points is why a multiplier lies within its error of the circle."""
-    near = {item.kind for item in bifurcations if points[0].arclength <= item.arclength <= points[-1].arclength}
+def _reach(points: Sequence[BranchPoint], first: int, last: int, closed: bool) -> tuple[float, float]:
+    """Arclengths of the neighbours of a run of points, of a closed curve beyond its seam as well."""
+    low, high = points[max(first - 1, 0)].arclength, points[min(last + 1, len(points) - 1)].arclength
+    if closed and len(points) > 1:
+        whole = points[-1].arclength
+        low = points[-2].arclength - whole if first == 0 else low
+        high = points[1].arclength + whole if last == len(points) - 1 else high
+    return low, high
+
+
+def _explained(result: FloquetResult, reach: tuple[float, float], bifurcations: Sequence[Bifurcation]) -> bool:
+    """Whether a bifurcation within reach is why a multiplier lies within its error of the circle."""
+    near = {item.kind for item in bifurcations if reach[0] <= item.arclength <= reach[1]}
     within = _open(result)
     mu, errors = result.multipliers[within], result.errors[within]
     explained = np.zeros(len(mu), dtype=bool)
@@ -221,7 +231,7 @@ def _replaced(points: Sequence[BranchPoint], method: StabilityMethod, name: str)
 
 
 def _between(
-    probe: BranchPoint, points: Sequence[BranchPoint], bifurcations: Sequence[Bifurcation], name: str
+    probe: BranchPoint, points: Sequence[BranchPoint], bifurcations: Sequence[Bifurcation], name: str, closed: bool
 ) -> Unsettled | None:
     """The step in which a multiplier comes within its error of the circle, unless a located bifurcation is why."""
     result = probe.floquet
@@ -234,7 +244,7 @@ def _between(
         first -= 1
     while last < len(points) - 1 and not points[last].floquet.decided:
         last += 1
-    if _explained(result, points[max(first - 1, 0) : last + 2], bifurcations):
+    if _explained(result, _reach(points, first, last, closed), bifurcations):
         return None
     words = f"{_worst(result)} at {name} = {_value(probe, name):.9g}, comes within its error of the unit circle"
     return _stretch(points[low], points[high], name, f"a multiplier, {words} and may pass it")

@@ -112,6 +112,8 @@ def unresolved(
     basis = guess.state.basis
     if coarser is not None and 0.5 * basis.harmonics <= coarser[0] <= 0.75 * basis.harmonics:
         fewer, value = coarser
+    elif basis.harmonics == 1:
+        return abs(guess.parameter - contact.parameter)
     else:
         other = HarmonicBasis(2 * basis.harmonics // 3, basis.nu)
         fewer, state = other.harmonics, guess.state
