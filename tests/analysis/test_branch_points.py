@@ -159,3 +159,27 @@ def test_a_fold_that_cannot_be_solved_is_in_doubt_and_not_in_the_list(monkeypatc
     assert abs(stretch.first - fold.omega) < 0.01
     assert sum(note.startswith(str(stretch)) for note in curve.warnings) == 1
     assert not any("LP" in note for note in curve.warnings)
+
+
+def test_a_curve_of_pitchforks_has_its_points_of_codimension_two():
+    """Rest under a parametric load: with no damping at mu = 0 the multiplier +1 is double. Written with half the
+    frequency the same points are period doublings.
+    """
+    equation = "x'' - (mu - x**2)*x' + (1 + q*cos({}*omega*t))*x + 0.5*x**3 = 0"
+    borders = []
+    for factor, kind, omega in ((2, "BP", (0.7, 1.4)), (1, "PD", (1.4, 2.8))):
+        system = so.System.from_equations(equation.format(factor), {"q": 0.5, "mu": -0.1})
+        start = so.frequency_response(system, omega).bifurcations[kind][0]
+        borders.append(so.track(start, "mu", (-0.4, 0.4)))
+    pitchforks, doublings = borders
+    resonances = pitchforks.bifurcations["R1"]
+    assert sorted(item.omega for item in resonances) == pytest.approx([0.87217941, 1.12074371], abs=1e-7)
+    assert max(abs(item.parameter("mu")) for item in resonances) < 1e-9
+    found, known = (
+        sorted((item.parameter("mu"), factor * item.omega) for item in border.bifurcations[kind])
+        for border, kind, factor in ((pitchforks, "GPF", 2.0), (doublings, "GPD", 1.0))
+    )
+    assert len(found) == 2
+    assert np.array(found) == pytest.approx(np.array(known), abs=1e-7)
+    torus = so.track(resonances[0], "mu", (-0.4, 0.4))
+    assert torus.kind == "NS"

@@ -142,3 +142,66 @@ def test_wrong_use_is_refused(wing):
     found = so.equilibria(wing, "U", (0.2, 2.5))
     with pytest.raises(so.InputError, match="nothing moves there"):
         so.limit_cycles(found.points[0], (0.2, 2.0), "U")
+
+
+@pytest.mark.parametrize("apart", [0.0, 1e-8, 1e-6])
+def test_pairs_of_different_frequency_that_cross_at_one_parameter_are_all_hopf_points(apart):
+    equations = [
+        "x'' - (mu - x**2)*x' + x = 0",
+        f"y'' - (mu - {apart!r} - y**2)*y' + 4*y = 0",
+        "z'' - (mu - z**2)*z' + 9*z = 0",
+    ]
+    curve = so.equilibria(so.System.from_equations(equations, {"mu": -0.1}), "mu", (-0.2, 1.0), max_step=0.03)
+    found = curve.bifurcations["Hopf"]
+    assert sorted(item.omega for item in found) == pytest.approx([1.0, 2.0, 3.0], abs=1e-9)
+    assert sorted(item.parameter("mu") for item in found) == pytest.approx([0.0, 0.0, apart], abs=1e-12)
+    assert not any("do not explain" in note or "another multiplier" in note for note in curve.warnings)
+    cycles = [so.limit_cycles(item, (-0.2, 0.3)) for item in found]
+    assert sorted(round(float(one.omega.max()), 6) for one in cycles) == [1.0, 2.0, 3.0]
+
+
+def test_hopf_points_know_no_resonance_with_the_frequency_that_equilibria_are_written_with():
+    """mu = 0, omega = sqrt(k), wherever the range of k ends."""
+    system = so.System.from_equations("x'' - (mu - x**2 - x**4)*x' + k*x + 0.2*x**3 = 0", {"mu": -0.1, "k": 1.0})
+    (hopf,) = so.equilibria(system, "mu", (-0.2, 1.0)).bifurcations["Hopf"]
+    curve = so.track(hopf, "k", (0.5, 3000.0))
+    assert curve.ended.count("reached the end of the range") == 2
+    assert not len(curve.bifurcations)
+    assert curve.warnings == ()
+    assert np.abs(curve.kappa / np.sqrt(curve.parameter("k")) - 1.0).max() < 1e-9
+    assert np.abs(curve.parameter("mu")).max() < 1e-12
+
+
+def test_a_bautin_point_is_where_the_first_lyapunov_coefficient_vanishes(tmp_path):
+    """By averaging at omega = 1: a + 3 * 0.3 = 0."""
+    system = so.System.from_equations(
+        "x'' + x'*(-mu - a*x**2 - 0.3*x'**2 + x**4) + k*x = 0", {"mu": -0.1, "a": 0.5, "k": 1.0}
+    )
+    (hopf,) = so.equilibria(system, "mu", (-0.3, 0.3)).bifurcations["Hopf"]
+    curve = so.track(hopf, "a", (-3.0, 3.0))
+    (bautin,) = curve.bifurcations
+    assert (bautin.kind, bautin.uncertainty) == ("GH", 0.0)
+    assert bautin.parameter("a") == pytest.approx(-0.9, abs=1e-9)
+    assert bautin.omega == pytest.approx(1.0, abs=1e-9)
+    for a, sense in ((-0.95, "supercritical"), (-0.85, "subcritical")):
+        (beside,) = so.equilibria(system.with_parameters(a=a), "mu", (-0.3, 0.3)).bifurcations["Hopf"]
+        assert beside.criticality == sense
+    curve.save(tmp_path / "hopf.nc")
+    assert so.load(tmp_path / "hopf.nc").bifurcations[0].omega == bautin.omega
+
+
+def test_hopf_points_and_limit_points_meet_in_a_bogdanov_takens_point():
+    """x'' + (x - d) x' + x^2 = b: Hopf points at b = d^2, limit points at b = 0."""
+    system = so.System.from_equations("x'' + (x - d)*x' - b + x**2 = 0", {"d": 0.5, "b": 0.6})
+    curve = so.equilibria(system, "b", (0.9, -0.1), start=[0.9])
+    hopf = so.track(curve.bifurcations["Hopf"][0], "d", (-1.0, 1.0))
+    assert hopf.warnings == ()
+    assert np.abs(hopf.parameter("b") - hopf.parameter("d") ** 2).max() < 1e-9
+    limits = so.track(curve.bifurcations["LP"][0], "d", (-1.0, 1.0))
+    for one in (hopf, limits):
+        (point,) = one.bifurcations
+        assert point.kind == "R1"
+        assert [point.parameter(name) for name in ("b", "d")] == pytest.approx([0.0, 0.0], abs=1e-7)
+    from_there = so.track(hopf.bifurcations[0], "d", (-1.0, 1.0))
+    assert from_there.kind == "LP"
+    assert np.abs(from_there.parameter("b")).max() < 1e-9

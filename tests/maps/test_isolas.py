@@ -70,6 +70,16 @@ def test_closed_branches_between_its_ends(isolas):
     assert 0.1 not in isola
 
 
+def test_a_closed_branch_has_both_limit_points_where_it_begins_at_one(isolas):
+    branch = isolas[0].at(0.3)
+    folds = sorted(item.omega for item in branch.bifurcations["LP"])
+    for item in branch.bifurcations["LP"]:
+        again = so.continue_branch(item, "omega", (1.3, 4.5))
+        assert again.closed
+        assert sorted(one.omega for one in again.bifurcations["LP"]) == pytest.approx(folds, abs=1e-8)
+        assert again.warnings == branch.warnings
+
+
 def test_stable_parts_by_shooting(isolas):
     """At j = 0.2 period doublings interrupt the stable part; multipliers by shooting say the same."""
     branch = isolas[0].at(0.2)

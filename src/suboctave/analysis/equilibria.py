@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Any, Unpack
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from suboctave.analysis.branches import from_end
 from suboctave.analysis.options import CurveOptions, CurveRun, settings_of
-from suboctave.curves.hopf import BEYOND, STILL
+from suboctave.curves.still import BEYOND, STILL, beyond, fastest
 from suboctave.errors import ConvergenceError, InputError, is_number, shortened
-from suboctave.harmonic.basis import Array
 from suboctave.model.inputs import check_bounds, check_is_system, check_parameter, numbers_of, timed
-from suboctave.model.linearised import ALL_EIGENVALUES, eigenvalues
+from suboctave.model.linearised import ALL_EIGENVALUES
 from suboctave.model.system import System
 from suboctave.options import with_options
 from suboctave.results.equilibria import Equilibria, as_equilibria
 
-#: share of half the frequency that equilibria are written with which theirs may reach; tries to find one high enough
-_BELOW, _TRIES = 0.9, 4
+#: tries to find a frequency to write equilibria with that is high enough
+_TRIES = 4
 
 
 @with_options(CurveOptions)
@@ -77,7 +76,7 @@ def equilibria(
         raise InputError(f"start must have {system.n} displacements, not shape {x.shape}")
     settings = settings_of(system, options)
     first = {**system.parameters, parameter: ends[0]}
-    omega = BEYOND * (_fastest(system, [(x, first)]) if highest is None else float(highest))
+    omega = BEYOND * (fastest(system, [(x, first)]) if highest is None else float(highest))
     for _ in range(_TRIES):
         run = CurveRun(system, parameter, ends, 1, settings)
         curve = run.scaled(run.curve(omega, 1, None))
@@ -87,20 +86,11 @@ def equilibria(
         branch = run.branch(trace)
         if highest is not None:
             return as_equilibria(branch, omega)
-        places = [(orbit.displacement(0.0), orbit.values) for orbit in branch.orbits]
-        fastest = _fastest(system, places)
-        if fastest <= 0.5 * _BELOW * omega:
+        higher = beyond(system, [(orbit.displacement(0.0), orbit.values) for orbit in branch.orbits], omega)
+        if higher == omega:
             return as_equilibria(branch, omega)
-        omega = BEYOND * fastest
+        omega = higher
     raise ConvergenceError(f"frequencies grow without bound along {parameter}: give highest=, or a shorter range")
-
-
-def _fastest(system: System, places: list[tuple[Array, Any]]) -> float:
-    """The highest frequency of small motions about positions, rad per unit time; where none oscillates, of the rates
-    at which they grow or decay.
-    """
-    found = np.concatenate([eigenvalues(system, x, values) for x, values in places])
-    return float(np.abs(found.imag).max()) or float(np.abs(found).max()) or 1.0
 
 
 def check_undriven(system: System) -> None:

@@ -120,7 +120,7 @@ def track(
     -------
     TrackedBranch
         With `extrema` (where either parameter turns) and, in `bifurcations`, points of codimension two as well: CP
-        (cusp), GPD (generalised period doubling), R1, R2, R3, R4 (resonances), LPPD, LPNS, PDNS, NSNS (fold-flip,
+        (cusp), GPD, GPF, GH (generalised period doubling, pitchfork, Hopf), R1, R2, R3, R4 (resonances), LPPD, LPNS, PDNS, NSNS (fold-flip,
         fold-, flip- and double Neimark-Sacker). Along multiple bifurcations, those of symmetric systems that fall
         together, extrema only.
 
@@ -180,7 +180,7 @@ def _branch(
 ) -> TrackedBranch:
     """The curve that begins at a bifurcation, with how it was computed."""
     system, kind = item.orbit.system, kind_of(item)
-    known, own = item.context or {}, ("onto", "damped", "mode") if kind in MOTION_KINDS else ("damped", "mode")
+    known, own = item.context or {}, ["damped", "mode", "still", *(["onto"] if kind in MOTION_KINDS else [])]
     options = {**options, **{name: known[name] for name in own if name in known}}
     context = {"system": system, "parameter": names[-1], **options}
     met = [replace(event, context=context) for event in trace.bifurcations]
@@ -242,7 +242,8 @@ def _free(item: Bifurcation, parameter: Any, bounds: Any, omega: Any) -> tuple[t
     system, known = item.orbit.system, Inherited(item)
     if isinstance(parameter, str) and "still" in known.known:
         # an equilibrium has no omega
-        parameter, bounds = (item.parameter_name, parameter), (known.bounds(item.parameter_name), bounds)
+        own = next((name for name in reversed(item.free_names) if name != parameter), item.parameter_name)
+        parameter, bounds = (own, parameter), (known.bounds(own), bounds)
     if isinstance(parameter, str):
         names: tuple[str, ...] = ("omega", parameter)
         if parameter == "omega":
@@ -383,7 +384,9 @@ def curve_onto(item: Bifurcation, onto: str | None) -> str:
         )
     kinds = CURVES_THROUGH[item.kind]
     if onto is None:
-        return next((kind for kind in kinds if kind != item.curve), kinds[0])
+        # branch points of a symmetry are on the place of limit points
+        found = "LP" if item.curve == "BP" else item.curve
+        return next((kind for kind in kinds if kind != found), kinds[0])
     if onto not in kinds:
         raise InputError(
             f"onto={onto!r}: the curves through a {item.kind} are {' and '.join(kinds)}{suggest(onto, kinds)}"

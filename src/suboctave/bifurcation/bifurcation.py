@@ -183,8 +183,9 @@ class Bifurcation:
 
     @property
     def omega(self) -> float:
-        """Circular frequency of the load; at a Hopf point that of the oscillation which begins."""
-        return self.kappa if self.kind == "Hopf" else self.orbit.omega
+        """Circular frequency of the load; at Hopf points, and on their curves, that of the oscillation which begins."""
+        still = self.kind == "Hopf" or (self.kappa > 0.0 and "still" in (self.context or {}))
+        return self.kappa if still else self.orbit.omega
 
     @property
     def parameters(self) -> Mapping[str, float]:

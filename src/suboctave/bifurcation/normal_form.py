@@ -287,6 +287,15 @@ def branch_point(state: BalanceState, vectors: NullVectors, name: str, kappa: fl
     return Terms(coefficients, {"c3": cubic_size, "g": own.g_size, "c": quadratic}, own.g_size)
 
 
+def pitchfork_coefficient(state: BalanceState, vectors: NullVectors, name: str) -> float:
+    """c3 of a branch point at which a symmetry breaks, psi as it is given; 0 at one at which none does."""
+    terms = branch_point(state, vectors, name, 0.0)
+    if abs(terms.coefficients["c"]) > _SYMMETRIC * terms.sizes["c"]:
+        return 0.0
+    turn = float(np.vdot(Expansion.of(state, Kind.INTEGER, vectors, name).psi, unweighted(state, vectors.left)).real)
+    return math.copysign(1.0, turn) * terms.coefficients["c3"]
+
+
 def _quadratic_size(own: Expansion) -> float:
     """Sum of the moduli that `psi.R''[phi, phi]` is made of, along the motion."""
     phi, psi = own.waves, Waves.of(own.state, Kind.INTEGER, own.psi)

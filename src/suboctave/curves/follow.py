@@ -26,6 +26,7 @@ from suboctave.curves.events.monitors import (
     PERIOD_DOUBLING,
     BifurcationKind,
     Located,
+    PairAmong,
     changes,
     locate,
     multiple,
@@ -48,6 +49,8 @@ from suboctave.interruption import Interruption
 _NOTHING = 1e-12
 #: cosine of two null vectors beyond which they are one
 _PARALLEL = 0.99
+#: distance of the multipliers of two Neimark-Sacker points of one motion beyond which they are two
+_OTHER_PAIR = 1e-3
 #: speed of the free parameter along a curve, in scaled arclength, at which it turns; how far from there a curve begins
 #: that is followed both ways
 _TURNS, _BESIDE = 1e-2, 3e-3
@@ -112,6 +115,8 @@ def same_event(a: Bifurcation, b: Bifurcation) -> bool:
     if (a.kind, a.parameter_name) != (b.kind, b.parameter_name):
         return False
     if a.kind == "grazing" and len({item.contact and item.contact.element for item in (a, b)}) > 1:
+        return False
+    if a.kind == "NS" and abs(a.critical_multiplier() - b.critical_multiplier()) > _OTHER_PAIR:
         return False
     if a.multiplicity > 1 and a.multiplicity == b.multiplicity and not _along_one(a, b):
         return False
@@ -466,7 +471,8 @@ class _Follower(Driver):
 
     def _changes(self, a: Sample, b: Sample) -> list[BifurcationKind]:
         """The kinds to look for between two samples, as they are to be solved for."""
-        kinds = [kind if kind.multiplicity > 1 else self._kinds[kind.name] for kind in changes(a, b)]
+        own = [(kind, kind.multiplicity > 1 or isinstance(kind, PairAmong)) for kind in changes(a, b)]
+        kinds = [kind if as_it_is else self._kinds[kind.name] for kind, as_it_is in own]
         return kinds if self._watch is None else [kind for kind in kinds if kind.name != "PD" or kind.multiplicity > 1]
 
     def _insert(self, item: Bifurcation) -> bool:

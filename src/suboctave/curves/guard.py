@@ -27,7 +27,7 @@ from suboctave.compiled import kernel
 from suboctave.continuation.linear import length
 from suboctave.continuation.point import CurvePoint
 from suboctave.continuation.problem import Array
-from suboctave.curves.events.monitors import BRANCH_POINT, NEIMARK_SACKER, BifurcationKind, Located, changes
+from suboctave.curves.events.monitors import BRANCH_POINT, BifurcationKind, Located, NeimarkSacker, changes
 from suboctave.curves.interior import FINEST, Interior, Steps, unsettled
 from suboctave.curves.sample import Sample
 from suboctave.curves.trace import Audit
@@ -42,6 +42,8 @@ _EXAMINED = 0.01
 _CROWD = 0.1
 #: steps shorter than this are not halved to tell a branch point from a jump between curves
 _JUMP = 1e-5
+#: way from an interval in which several pairs cross within which the test for pairs says nothing
+_BESIDE_PAIRS = 3.0 * FINEST
 #: distance from a branch point, as a share of an interval, from which on one cuts it
 _CLEAR = 0.1
 #: the ends say so themselves if chord and tangents agree to this share of the length
@@ -166,7 +168,12 @@ class GuardedStep(Interior):
 
     def harmless(self, p: Sample, q: Sample, reason: str) -> bool:
         # no event, but too close to one to tell it from two; open verdicts are stated as such
-        return reason not in (_BESIDE, _TOGETHER) and (bool(changes(p, q)) or (reason in _REASONS[1:] and _open(p, q)))
+        if reason in (_BESIDE, _TOGETHER):
+            return False
+        # beside an interval in which several pairs cross their product comes to zero without changing its sign
+        near = [(a, b) for a, b in pairwise(self.samples) if max(p.place - b.place, a.place - q.place) <= _BESIDE_PAIRS]
+        several = reason == _REASONS[3] and any(abs(a.unstable - b.unstable) > 3 for a, b in near)
+        return several or bool(changes(p, q)) or (reason in _REASONS[1:] and _open(p, q))
 
     def cut(self, p: Sample, q: Sample, share: float) -> list[tuple[Sample, Sample]]:
         """See `Interior.cut`: not right at a branch point."""
@@ -209,7 +216,7 @@ class GuardedStep(Interior):
         Its product changes sign there, and in its ring if multipliers lie in rings. Without rings it also does where
         two real ones are each other's inverses: alone the count tells which.
         """
-        if p.measures[0, -1] == q.measures[0, -1] or all(kind is NEIMARK_SACKER for kind in changes(p, q)):
+        if p.measures[0, -1] == q.measures[0, -1] or all(isinstance(kind, NeimarkSacker) for kind in changes(p, q)):
             return False
         stencil, at = self._around(p, q)
         rings = next(iter(self.relative(stencil, 3)), None) if len(stencil) > 2 else None

@@ -16,26 +16,15 @@ from suboctave.continuation.linear import length
 from suboctave.curves.events.locate import Guess, locate_singular
 from suboctave.curves.kinds.limit_cycle import oscillating
 from suboctave.curves.sample import Sample
+from suboctave.curves.still import BEYOND, at_rest
 from suboctave.errors import ConvergenceError
-from suboctave.harmonic.basis import Array, HarmonicBasis
-from suboctave.harmonic.evaluation import BalanceState
+from suboctave.harmonic.basis import Array
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.perturbation import Kind
 from suboctave.harmonic.truncation import truncation
 
-#: frequency that an equilibrium is written with, as a multiple of the highest at which it may oscillate
-BEYOND = 4.5
 #: how far a Hopf point may lie from the cycles that end in it, in units of the motion and of the parameter's range
 _BESIDE = 0.1
-STILL = HarmonicBasis(1)
-
-
-def at_rest(state: BalanceState, omega: float) -> BalanceState:
-    """The mean of a motion, at another frequency."""
-    balance = state.balance.with_basis(STILL)
-    x = np.zeros((STILL.size, state.balance.size))
-    x[0] = state.x[0]
-    return balance.settle(x, omega, state.values).at(x, omega, state.values)
 
 
 def hopf_beside(a: Sample, b: Sample) -> TrackedEvent:

@@ -21,6 +21,7 @@ from suboctave.bifurcation.gaps import rests_in_corner
 from suboctave.continuation.linear import length
 from suboctave.continuation.problem import Array, Curve, Evaluation
 from suboctave.curves.augmentation import PLAIN, Augmentation, Equations
+from suboctave.curves.still import beyond
 from suboctave.errors import ConvergenceError
 from suboctave.floquet.monodromy import floquet_multipliers
 from suboctave.floquet.result import FloquetResult
@@ -213,6 +214,16 @@ class MotionProblem:
         """
         return self.augmentation.name == "LP" and self.balance.basis.nu % 2 == 0
 
+    @lazy
+    def still(self) -> bool:
+        """Whether its motions are equilibria: nothing drives them, and nothing holds a phase."""
+        driven = "omega" in self.names or self.balance.system.driven
+        return not (driven or self.augmentation.free_phase) and self.balance.basis.harmonics == 1
+
+    def alike(self, other: MotionProblem) -> bool:
+        """Whether two members of a curve have the same discretisation."""
+        return self.balance is other.balance and self.omega == other.omega
+
     def index(self, name: str) -> int:
         """Index of one of the free parameters in u."""
         return self.balance.dimension + self.augmentation.extras + self.names.index(name)
@@ -296,14 +307,25 @@ class MotionProblem:
             balance = self._in_basis(self._basis(evaluation, self.adaptive))
         x = state.x if balance is self.balance else self.balance.basis.resized(state.x, balance.basis)
         balance = balance.settle(x, state.omega, state.values)
-        if balance is self.balance and augmentation is self.augmentation:
+        omega = self.omega
+        if self.still and self.steps % CRITICAL_EVERY == 0:
+            omega = beyond(balance.system, [(state.recovered[0].real, state.values)], omega)
+        if balance is self.balance and augmentation is self.augmentation and omega == self.omega:
             return self
         self.cache[balance.basis] = balance
         if balance.basis != self.balance.basis:
             augmentation = augmentation.resized(balance.basis, balance.size)
         force = max(state.balanced.scale, self.least_force(state))
         erred = self.erred if balance.basis.harmonics >= self.balance.basis.harmonics else 0.0
-        return replace(self, balance=balance, augmentation=augmentation, force=force, steps=self.steps + 1, erred=erred)
+        return replace(
+            self,
+            balance=balance,
+            augmentation=augmentation,
+            omega=omega,
+            force=force,
+            steps=self.steps + 1,
+            erred=erred,
+        )
 
     def _basis(self, evaluation: MotionEvaluation, adaptive: AdaptiveHarmonics) -> HarmonicBasis:
         """The basis that a point needs: a small neglected motion may still matter where a stiff contact just closes."""

@@ -16,7 +16,7 @@ import numpy as np
 from suboctave.bifurcation import measures
 from suboctave.bifurcation.bordered import NullVectors, null_vectors
 from suboctave.bifurcation.gaps import GapExtrema, crossing_speeds, gap_extrema
-from suboctave.bifurcation.normal_form import cubic_coefficient, responding
+from suboctave.bifurcation.normal_form import cubic_coefficient, pitchfork_coefficient, responding, torus
 from suboctave.continuation.linear import Factor, LeadingBlock, length
 from suboctave.continuation.point import CurvePoint
 from suboctave.curves.kinds.branch_point import BranchPointEquations
@@ -28,6 +28,7 @@ from suboctave.curves.kinds.multiple import MultipleEquations
 from suboctave.curves.kinds.nonlinear_mode import ModeEquations
 from suboctave.curves.kinds.singular import SingularEquations, SingularOperator
 from suboctave.curves.motion import MotionEvaluation, MotionProblem
+from suboctave.curves.still import at_rest
 from suboctave.curves.trace import BranchPoint
 from suboctave.floquet.held import Grip, grip
 from suboctave.floquet.methods import Monodromy, StabilityMethod
@@ -189,8 +190,10 @@ class Sample:
     @lazy
     def oscillation(self) -> float:
         """Size of the motion but its mean, in scaled arclength: as slopes do, it vanishes where cycles shrink to an
-        equilibrium.
+        equilibrium. Equilibria have none.
         """
+        if self.curve.still:
+            return 0.0
         return length(oscillating(self.state)) / self.curve.unit(self.point.weights)
 
     @property
@@ -255,6 +258,20 @@ class Sample:
         by_motion, by_omega = -by_x.real.reshape(self.state.x.shape), -rates["omega"].real if free else 0.0
         solve = responding(self.state) if free else self._responding
         return cubic_coefficient(self.state, b.right, b.left, by_motion, by_omega, solve)
+
+    @lazy
+    def pitchfork(self) -> float:
+        """c3 of a branch point, psi not turned; 0 where no symmetry breaks."""
+        assert self.vectors is not None
+        return pitchfork_coefficient(self.state, self.vectors, self.curve.name)
+
+    @lazy
+    def lyapunov(self) -> float:
+        """The real part of c3 of a Hopf point, see `bifurcation.normal_form`: its first Lyapunov coefficient."""
+        assert self.vectors is not None
+        # what rounding leaves of an oscillation is no motion to differentiate along
+        still = at_rest(self.state, self.state.omega)
+        return torus(still, self.vectors, self.curve.name, self.kappa).coefficients["c3"]
 
     def _responding(self, rhs: Array) -> tuple[Array, float]:
         """See `normal_form.responding`: by the factors that the point was solved with."""

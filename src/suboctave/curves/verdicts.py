@@ -25,6 +25,8 @@ from suboctave.harmonic.evaluation import BalanceState
 from suboctave.interruption import Interruption
 from suboctave.kinds import KINDS
 
+#: distance, in scaled arclength and of multipliers, up to which bifurcations fall together
+_AT_ONCE = 1e-5
 #: motions in a row that witnesses could not settle, after which they are not asked until a verdict is clear again
 _PATIENCE = 3
 
@@ -64,7 +66,7 @@ def with_verdicts(trace: Trace, method: StabilityMethod, name: str) -> Trace:
         first, last = stretch.arclength
         if not any(first <= u.arclength[1] and u.arclength[0] <= last for u in (*trace.audit.unsettled, *unsettled)):
             unsettled.append(stretch)
-    notes += [note for item in bifurcations if (note := _doubt_beside(item)) is not None]
+    notes += [note for item in bifurcations if (note := _doubt_beside(item, bifurcations)) is not None]
     notes += _replaced(points, method, name)
     return replace(
         trace,
@@ -146,9 +148,16 @@ def _others_open(item: Bifurcation) -> np.ndarray:
     return within
 
 
-def _doubt_beside(item: Bifurcation) -> str | None:
-    """A sentence if a multiplier besides the critical one leaves open what is stable on either side."""
+def _doubt_beside(item: Bifurcation, bifurcations: Sequence[Bifurcation]) -> str | None:
+    """A sentence if a multiplier besides the critical one leaves open what is stable on either side, and none of the
+    bifurcations that fall together with it is why.
+    """
     within = _others_open(item)
+    for other in bifurcations:
+        if other is not item and abs(other.arclength - item.arclength) <= _AT_ONCE:
+            critical = other.critical_multiplier()
+            away = np.minimum(np.abs(item.multipliers - critical), np.abs(item.multipliers - np.conj(critical)))
+            within &= away > _AT_ONCE
     if item.kind in CONTACT_KINDS or not within.any():
         return None
     i = int(np.argmax(within))

@@ -39,7 +39,7 @@ SYMBOLS: dict[str | tuple[int, int, int], str] = {
     "p": "pentagon", "h": "hexagon", "H": "hexagon2", "8": "octagon",
     (4, 1, 0): "star-diamond", (3, 1, 0): "star-triangle-up", (3, 1, 180): "star-triangle-down",
     (4, 1, 45): "star-square", (6, 1, 0): "hexagram", (8, 1, 0): "asterisk",
-    "+": "cross-thin", (5, 1, 180): "star", (5, 0, 180): "pentagon", (7, 1, 0): "hash",
+    "+": "cross-thin", (5, 1, 0): "star", (5, 1, 180): "star", (5, 0, 180): "pentagon", (7, 1, 0): "hash",
 }  # fmt: skip
 #: what symbols there are in space; circles for all others
 _SOLID: dict[Any, str] = {(4, 1, 0): "diamond", "s": "square", "D": "diamond", "d": "diamond", "P": "cross"}

@@ -48,6 +48,9 @@ _TRANSVERSAL = 1e-7
 #: how far apart multipliers that pass the circle together may lie, as a share of their distance from it: where they are
 #: looked for in one, which the equations then have to confirm
 _ALIKE = 1e-3
+#: length of an interval, in scaled arclength, in which several pairs are looked for at once: twice that of one that is
+#: not cut any further
+_SHORTEST = 2e-5
 _NONE = np.zeros(0)
 
 
@@ -201,6 +204,35 @@ class NeimarkSacker(BifurcationKind):
         return cmath.exp(2j * cmath.pi * solution.kappa / solution.state.rate)
 
 
+class PairAmong(NeimarkSacker):
+    """One of several pairs of different frequencies that cross the circle within the shortest interval, by its rank
+    among these, ascending: as the modes of oscillators with equal dampers do.
+    """
+
+    def __init__(self, rank: int, count: int) -> None:
+        super().__init__()
+        self.rank, self.count = rank, count
+
+    def _pair(self, sample: Sample) -> complex:
+        pairs = upper(sample.floquet.multipliers)
+        nearest = pairs[np.argsort(np.abs(np.abs(pairs) - 1.0), kind="stable")[: self.count]]
+        if len(nearest) < self.count:
+            raise ConvergenceError("no complex pair of multipliers here")
+        return complex(nearest[np.argsort(np.angle(nearest), kind="stable")[self.rank]])
+
+    def fraction(self, a: Sample, b: Sample) -> float:
+        return _zero(abs(self._pair(a)) - 1.0, abs(self._pair(b)) - 1.0)
+
+    def kappa(self, sample: Sample) -> float:
+        return float(np.angle(self._pair(sample))) * sample.state.rate / (2.0 * np.pi)
+
+
+@lru_cache(maxsize=64)
+def among(rank: int, count: int) -> PairAmong:
+    """One object for each."""
+    return PairAmong(rank, count)
+
+
 class Multiple(BifurcationKind):
     """Several of a kind fall together, as the modes of equal sectors do."""
 
@@ -256,7 +288,9 @@ def changes(a: Sample, b: Sample) -> tuple[BifurcationKind, ...]:
         return b.compared[1]
     kinds = _passing_one(a, b)
     if NEIMARK_SACKER.crossing(a, b) is not None:
-        kinds.append(multiple(NEIMARK_SACKER, len(_together(NEIMARK_SACKER, a, b)[0])))
+        together, apart = len(_together(NEIMARK_SACKER, a, b)[0]), _pairs_within(a, b)
+        alone = together > 1 or apart < 2
+        kinds += [multiple(NEIMARK_SACKER, together)] if alone else [among(rank, apart) for rank in range(apart)]
     b.compared = weakref.ref(a), tuple(kinds)
     return b.compared[1]
 
@@ -269,6 +303,14 @@ def _passing_one(a: Sample, b: Sample) -> list[BifurcationKind]:
         if several or kind.changed(a, b):
             kinds.append(multiple(kind, several))
     return kinds
+
+
+def _pairs_within(a: Sample, b: Sample) -> int:
+    """How many pairs cross the circle within the shortest interval, 0 in longer ones, which are cut."""
+    if b.place - a.place > _SHORTEST:
+        return 0
+    outside = [int(np.count_nonzero(np.abs(upper(sample.floquet.multipliers)) > 1.0)) for sample in (a, b)]
+    return abs(outside[1] - outside[0])
 
 
 def _together(kind: BifurcationKind, a: Sample, b: Sample) -> tuple[Array, Array]:

@@ -190,11 +190,12 @@ def resonant_between(a: Sample, b: Sample) -> float | None:
     if not isinstance(augmentation, SingularOperator) or augmentation.kind is not Kind.FREE:
         return None
     before, share = a.kappa / a.state.rate, b.kappa / b.state.rate
-    double = abs(share - 0.5) < 0.25
+    # kappa of an equilibrium knows no base frequency
+    double = abs(share - 0.5) < 0.25 and not b.curve.still
     if double and _symmetric(b):
         return None
     # a step may lead across
-    target = 0.5 if double else float(round(share))
+    target = 0.5 if double else 0.0 if b.curve.still else float(round(share))
     distance = (share - target) * math.copysign(1.0, before - target)
     return target if distance < _RESONANT or (distance < _DOUBTFUL and _split(b)) else None
 

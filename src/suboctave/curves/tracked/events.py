@@ -56,7 +56,7 @@ _SHORTEST = 6
 
 def same_discretisation(a: Sample, b: Sample, newton: NewtonOptions) -> Sample:
     """The first of two neighbours solved again in the discretisation of the second, where that differs."""
-    if a.curve.balance is b.curve.balance:
+    if a.curve.alike(b.curve):
         return a
     return a.at(solved_again(a.point, b.curve, b.point.weights, newton, BEGINNING))
 

@@ -32,6 +32,7 @@ from suboctave.bifurcation.bordered import NullVectors, bordered, null_vectors, 
 from suboctave.bifurcation.measures import crossing_pair
 from suboctave.continuation.linear import length
 from suboctave.continuation.point import crossing_matrix
+from suboctave.curves.kinds.branch_point import BranchPointUnfolded
 from suboctave.curves.kinds.free_phase import FreePhaseOperator
 from suboctave.curves.kinds.nonlinear_mode import NonlinearMode
 from suboctave.curves.kinds.ridge import Ridge, RidgeEquations
@@ -283,6 +284,31 @@ class GeneralisedDoubling(CurveTest):
 
 
 @dataclass(frozen=True)
+class GeneralisedPitchfork(CurveTest):
+    """The motions without the symmetry change sides; a curve of their limit points begins."""
+
+    kind = "GPF"
+    of_third_order = True
+
+    def value(self, sample: Sample) -> float:
+        return sample.pitchfork
+
+    def smooth(self, sample: Sample) -> tuple[float, float]:
+        return super().smooth(sample) if sample.pitchfork else (1.0, 0.0)
+
+
+@dataclass(frozen=True)
+class GeneralisedHopf(CurveTest):
+    """The limit cycles that begin change sides; a curve of their limit points begins."""
+
+    kind = "GH"
+    of_third_order = True
+
+    def value(self, sample: Sample) -> float:
+        return sample.lyapunov
+
+
+@dataclass(frozen=True)
 class DoubleMultiplier(CurveTest):
     """R1 on LP curves, R2 on PD curves: a curve of Neimark-Sacker points begins."""
 
@@ -513,6 +539,11 @@ _OF_BIFURCATIONS: dict[Kind, tuple[CurveTest, ...]] = {
         PairCrossing("NSNS"),
     ),
 }
+#: the same of equilibria
+_OF_EQUILIBRIA: dict[Kind, tuple[CurveTest, ...]] = {
+    Kind.INTEGER: (Cusp(), DoubleMultiplier("R1"), PairCrossing("LPNS")),
+    Kind.FREE: (GeneralisedHopf(), RealCrossing("LPNS", Kind.INTEGER), PairCrossing("NSNS")),
+}
 #: the same of limit cycles
 _OF_CYCLES: dict[Kind, tuple[CurveTest, ...]] = {
     Kind.HALF: (GeneralisedDoubling(), DoubleMultiplier("R2"), FoldOfCycles("LPPD"), PairCrossing("PDNS")),
@@ -542,6 +573,9 @@ def tests_of(curve: MotionProblem) -> tuple[CurveTest, ...]:
     if own.name in MOTION_KINDS:
         peaks = (PeakTurns(),) if isinstance(own, Ridge) else ()
         return (*turns, *peaks, *_OF_MOTIONS)
+    if isinstance(own, BranchPointUnfolded):
+        return (*turns, DoubleMultiplier("R1"), GeneralisedPitchfork())
     if not isinstance(own, SingularOperator):
         return turns
-    return turns + _OF_BIFURCATIONS[own.kind][: 2 if curve.balance.system.n == 1 else None]
+    known = _OF_EQUILIBRIA if curve.still else _OF_BIFURCATIONS
+    return turns + known[own.kind][: 2 if curve.balance.system.n == 1 else None]

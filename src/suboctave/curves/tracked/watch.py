@@ -77,7 +77,7 @@ class StepWatch(Steps):
 
     def parted(self, p: Sample, q: Sample) -> bool:
         # determinants and null vectors belong to a discretisation
-        return p.curve.balance is not q.curve.balance or super().parted(p, q)
+        return not p.curve.alike(q.curve) or super().parted(p, q)
 
     def functions(self, sample: Sample) -> Array:
         """The functions of the tests that are smooth along the curve: see `Interior.measures`."""
