@@ -91,7 +91,7 @@ KINDS: dict[str, Kind] = {
     "extremum": Kind("extremum of a parameter along a curve of bifurcations", "d", _WHITE, 0.9, "extremum"),
     "CP": Kind("cusp", "P", "#0072B2", 1.1),
     "GPD": Kind("generalised period doubling", "h", "#E69F00", 1.12),
-    "GPF": Kind("generalised pitchfork", "H", "#E69F00", 1.12),
+    "GPF": Kind("generalised pitchfork", (6, 1, 30), "#E69F00", 1.12),
     "GH": Kind("generalised Hopf point (Bautin)", (5, 1, 0), "#E69F00", 1.12),
     "R1": Kind("1:1 resonance", "<", "#56B4E9"),
     "R2": Kind("1:2 resonance", ">", "#56B4E9"),

@@ -120,9 +120,9 @@ def track(
     -------
     TrackedBranch
         With `extrema` (where either parameter turns) and, in `bifurcations`, points of codimension two as well: CP
-        (cusp), GPD, GPF, GH (generalised period doubling, pitchfork, Hopf), R1, R2, R3, R4 (resonances), LPPD, LPNS, PDNS, NSNS (fold-flip,
-        fold-, flip- and double Neimark-Sacker). Along multiple bifurcations, those of symmetric systems that fall
-        together, extrema only.
+        (cusp), GPD, GPF, GH (generalised period doubling, pitchfork, Hopf), R1, R2, R3, R4 (resonances), LPPD, LPNS,
+        PDNS, NSNS (fold-flip, fold-, flip- and double Neimark-Sacker). Along multiple bifurcations, those of symmetric
+        systems that fall together, extrema only.
 
     Raises
     ------

@@ -38,7 +38,7 @@ SYMBOLS: dict[str | tuple[int, int, int], str] = {
     "s": "square", "D": "diamond", "d": "diamond-tall", "P": "cross", "x": "x-thin", "X": "x", "*": "star",
     "p": "pentagon", "h": "hexagon", "H": "hexagon2", "8": "octagon",
     (4, 1, 0): "star-diamond", (3, 1, 0): "star-triangle-up", (3, 1, 180): "star-triangle-down",
-    (4, 1, 45): "star-square", (6, 1, 0): "hexagram", (8, 1, 0): "asterisk",
+    (4, 1, 45): "star-square", (6, 1, 0): "hexagram", (6, 1, 30): "hexagram", (8, 1, 0): "asterisk",
     "+": "cross-thin", (5, 1, 0): "star", (5, 1, 180): "star", (5, 0, 180): "pentagon", (7, 1, 0): "hash",
 }  # fmt: skip
 #: what symbols there are in space; circles for all others
