@@ -1,16 +1,15 @@
 """Ridges: motions whose amplitude is extreme along the response, over the first free parameter.
 
-With t the direction of the response there, `R_X t_X + R_p t_p = 0`, and G the amplitude,
+With t the direction of the response there, `R_X t_X + R_p t_p = 0`, and G the amplitude, `G_X . t_X = 0`: the matrix
 
-    h = G_X . t_X = 0,    [R_X R_p; c^T] t = [0; 1],
+    B = [R_X R_p; G_X 0],    [B b; c^T 0] [t; g] = [0; 1],    g = 0,
 
-c the direction at the last point: smooth through limit points, where p turns. (Such curves: Raze, Volvert & Kerschen,
-Tracking amplitude extrema of nonlinear frequency responses using the harmonic balance method, 2024.) G is the largest
-|x| of the observed displacement, or the amplitude of one of its harmonics. h changes by
-
-    dh = t_X . dG_X - m . d(R_X t_X + R_p t_p),    [R_X R_p; c^T]^T [m; .] = [G_X; 0],
-
-the second part a central difference of two Jacobians along t.
+is singular, b and c its null vectors at the last point. It has one null vector at limit points, where p turns, and also
+where a closed response shrinks to a point, or two cross: there every direction is one of the response, and in one of
+them the amplitude stands. (Such curves: Raze, Volvert & Kerschen, Tracking amplitude extrema of nonlinear frequency
+responses using the harmonic balance method, 2024; borders: Govaerts, Numerical Methods for Bifurcations of Dynamical
+Equilibria, SIAM 2000.) G is the largest |x| of the observed displacement, or the amplitude of one of its harmonics.
+With w the left null vector g changes by `-w . dB t`, of R a central difference of two Jacobians along t.
 """
 
 from __future__ import annotations
@@ -34,13 +33,13 @@ _STEP = 1e-5
 
 @dataclass(frozen=True)
 class Ridge(Augmentation):
-    """`dof` of the displacement; `multiple` of omega of its harmonic, None for the largest displacement; `border`, the
-    direction c in units of the motion's size and of the parameter's value at the start, `along`.
+    """`dof` of the displacement; `multiple` of omega of its harmonic, None for the largest displacement; `borders`, c
+    and b in units of the motion's size and of the parameter's value at the start, `along`.
     """
 
     dof: int
     multiple: float | None
-    border: Array
+    borders: tuple[Array, Array]
     along: float
     reads_observed = True
 
@@ -53,23 +52,26 @@ class Ridge(Augmentation):
     def through(cls, item: Bifurcation, state: BalanceState, names: tuple[str, ...]) -> tuple[Ridge, Array]:
         """See `Augmentation.through`."""
         value = state.omega if names[0] == "omega" else state.values[names[0]]
-        blank = cls(item.context["observe"], item.context["onto"].get("harmonic"), np.zeros(0), abs(value) or 1.0)
-        scaled = blank.at(state, np.zeros(0), names).scaled
-        return replace(blank, border=np.linalg.svd(scaled)[2][-1]), np.zeros(0)
+        none = np.zeros(0)
+        blank = cls(item.context["observe"], item.context["onto"].get("harmonic"), (none, none), abs(value) or 1.0)
+        left, _, right = np.linalg.svd(blank.at(state, none, names).matrix)
+        return replace(blank, borders=(right[-1], left[:, -1])), none
 
     def at(self, state: BalanceState, extra: Array, names: tuple[str, ...]) -> RidgeEquations:
         return RidgeEquations(self, state, names)
 
     def resized(self, basis: HarmonicBasis, size: int) -> Ridge:
-        kept = np.zeros(basis.size * size)
-        own = self.border[:-1]
-        kept[: min(len(kept), len(own))] = own[: len(kept)]
-        border = np.append(kept, self.border[-1])
-        return replace(self, border=border / length(border))
+        borders = []
+        for own in self.borders:
+            kept = np.zeros(basis.size * size + 1)
+            count = min(len(kept), len(own)) - 1
+            kept[:count], kept[-1] = own[:count], own[-1]
+            borders.append(kept / length(kept))
+        return replace(self, borders=(borders[0], borders[1]))
 
 
 class RidgeEquations(Equations):
-    """h in units of the motion."""
+    """g, of B with rows of about unit length."""
 
     def __init__(self, of: Ridge, state: BalanceState, names: tuple[str, ...]) -> None:
         self.of, self.state, self.names = of, state, names
@@ -82,23 +84,33 @@ class RidgeEquations(Equations):
         return np.append(size / weight, self.of.along)
 
     @lazy
-    def scaled(self) -> Array:
-        """`[R_X R_p]` in these units, (n, n + 1)."""
-        scaled: Array = self.state.extended_jacobian(self.names[0]) * self._sizes
-        return scaled
+    def _units(self) -> tuple[float, float]:
+        """What the rows of R and that of G are divided by."""
+        extended = self.state.extended_jacobian(self.names[0]) * self._sizes
+        return float(np.abs(extended).max()), length(self._amplitude[1] * self._sizes[:-1]) or 1.0
 
     @lazy
-    def _direction(self) -> tuple[Array, Array]:
-        """t and m, both in these units."""
-        n = len(self.scaled)
-        matrix = np.concatenate((self.scaled, self.of.border[None] * np.abs(self.scaled).max()))
-        factor = Factor.of(matrix)
+    def matrix(self) -> Array:
+        """B in these units, (n + 1, n + 1)."""
+        (force, amplitude), n = self._units, len(self._sizes) - 1
+        matrix = np.zeros((n + 1, n + 1))
+        matrix[:n] = self.state.extended_jacobian(self.names[0]) * self._sizes / force
+        matrix[n, :n] = self._amplitude[1] * self._sizes[:-1] / amplitude
+        return matrix
+
+    @lazy
+    def _null(self) -> tuple[Array, Array, float]:
+        """t, w and g."""
+        right, left = self.of.borders
+        n = len(self.matrix)
+        bordered = np.zeros((n + 1, n + 1))
+        bordered[:n, :n], bordered[:n, n], bordered[n, :n] = self.matrix, left, right
+        factor = Factor.of(bordered)
         if factor.singular:
-            raise ConvergenceError("two branches meet at the ridge")
-        t = factor.solve(np.eye(1, n + 1, n)[0])
-        t = t / length(t)
-        gradient = np.append(self._amplitude[1] * self._sizes[:-1], 0.0)
-        return t, factor.solve(gradient, adjoint=True)[:n]
+            raise ConvergenceError("two ridges meet")
+        unit = np.eye(1, n + 1, n)[0]
+        t, w = factor.solve(unit), factor.solve(unit, adjoint=True)
+        return t[:n], w[:n], float(t[n])
 
     @lazy
     def _amplitude(self) -> tuple[float, Array, Array, float]:
@@ -132,28 +144,23 @@ class RidgeEquations(Equations):
         gradient = self._amplitude[1]
         return float(gradient @ along[: len(gradient)]) / self._unit
 
-    @lazy
-    def _slope(self) -> float:
-        """h."""
-        return float((self._amplitude[1] * self._sizes[:-1]) @ self._direction[0][:-1])
-
     @property
     def _unit(self) -> float:
         return self._amplitude[0] or 1.0
 
     @property
     def values(self) -> Array:
-        return np.array([self._slope / self._unit])
+        return np.array([self._null[2]])
 
     @lazy
     def rows(self) -> Array:
-        t, m = self._direction
+        (t, w, _), (force, amplitude) = self._null, self._units
         _, _, across, bend = self._amplitude
         step = t * self._sizes
         ahead, behind = (self._moved(s * _STEP * step) for s in (1.0, -1.0))
-        row = -m @ (ahead - behind) / (2.0 * _STEP)
-        row[: len(across)] += bend * float(across @ step[:-1]) * across
-        return row[None] / self._unit
+        row = -w[:-1] @ (ahead - behind) / (2.0 * _STEP * force)
+        row[: len(across)] -= w[-1] * bend * float(across @ step[:-1]) / amplitude * across
+        return row[None]
 
     def _moved(self, by: Array) -> Array:
         """Derivatives of R by the coefficients and all names, beside."""
@@ -167,4 +174,5 @@ class RidgeEquations(Equations):
         return np.column_stack((moved.jacobian, *(moved.residual_by(one) for one in self.names)))
 
     def renewed(self) -> Ridge:
-        return replace(self.of, border=self._direction[0])
+        t, w, _ = self._null
+        return replace(self.of, borders=(t / length(t), w / length(w)))
