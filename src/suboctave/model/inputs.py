@@ -85,14 +85,9 @@ def check_count(name: str, value: Any, least: int = 1) -> int:
     return int(value)
 
 
-def observed_dof(system: System, observe: Any) -> int:
+def observed_dof(system: System, observe: Any, name: str = "observe") -> int:
     """The degree of freedom that is observed, by its number or its name; by default the system's."""
-    if isinstance(observe, str):
-        if observe not in system.dof_names:
-            has = suggest(observe, system.dof_names) or ": they have no names"
-            raise InputError(f"observe={observe!r} is none of the degrees of freedom{has}")
-        return system.dof_names.index(observe)
-    return chosen_dof(observe, system.observed_dof, system.n, "observe")
+    return chosen_dof(observe, system.observed_dof, system.n, name, system.dof_names)
 
 
 def check_element(system: System, element: Any, gapped: Sequence[int] | None = None) -> int:
