@@ -151,6 +151,14 @@ def shortened(value: Any) -> str:
     return " ".join(_shown.repr(value).split())
 
 
+def damage(error: Exception, most: int = 120) -> str:
+    """What a reader says of a damaged file, in one line of at most so many characters; NumPy takes what is no array
+    for pickled Python objects, and advises to unpickle them.
+    """
+    said = " ".join(str(error).split())[:most]
+    return f"{type(error).__name__}: {'it holds no arrays of numbers' if 'pickle' in said else said}"
+
+
 def suggest(name: str, known: Iterable[str], limit: int = 12) -> str:
     """The tail of a message on an unknown name: the closest known names, or else all of them (at most `limit`).
 

@@ -37,6 +37,8 @@ _OTHER_NAMES = {
         *((f"u{direction}",) if i >= 3 else ()),
     )
 }
+#: texts that name a node, not a DOF
+_NODE = re.compile(r"node[\s_]+\S+|[+-]?\d+", re.IGNORECASE)
 #: names shown of many
 _SHOWN = 6
 
@@ -130,8 +132,13 @@ class DofMap:
         return place
 
     def of_node(self, text: str) -> list[int]:
-        """The degrees of freedom of a node, "node 1042" or "1042"; none where the text is not the name of one."""
+        """The degrees of freedom of a node, "node 1042" or "1042"; none where the text is not the name of one.
+
+        Raises `InputError` for the form "node 1042" or a number where there is no such node.
+        """
         node = node_label(text)
+        if node not in self._nodes and _NODE.fullmatch(text.strip()):
+            raise InputError(self._no_node(node))
         return [self._places[node, direction] for direction in self._nodes.get(node, ())]
 
     def without(self, dofs: Sequence[int]) -> DofMap:
@@ -148,6 +155,10 @@ class DofMap:
             has = ", ".join(self._nodes[node])
             fixed = ", ".join(sorted(other for which, other in self.fixed if which == node))
             return f"node {node} has no direction {direction!r}; it has {has}" + (f" (fixed: {fixed})" if fixed else "")
+        return self._no_node(node)
+
+    def _no_node(self, node: Node) -> str:
+        """Why there is no such node."""
         if any(which == node for which, _ in self.fixed):
             return f"all DOFs of node {node} are fixed: it moves no more"
         return f"there is no node {node!r}{self._near(node)}"

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from suboctave.errors import InputError, Key, suggest
+from suboctave.errors import InputError, Key, damage, suggest
 from suboctave.model import library
 from suboctave.model.description import build_part
 from suboctave.model.matrices import matrix_coefficient
@@ -250,7 +250,7 @@ def read_matrix(path: Path, key: str | None) -> Any:
     except InputError:
         raise
     except Exception as error:  # whatever a damaged file makes of its reader
-        raise InputError(f"cannot read {path}: {type(error).__name__}: {str(error)[:120]}") from None
+        raise InputError(f"cannot read {path}: {damage(error)}") from None
     if not hasattr(matrix, "tocsr"):
         matrix = np.asarray(matrix)
         if matrix.dtype.kind not in "fiu":
