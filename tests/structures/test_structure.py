@@ -90,6 +90,31 @@ def test_a_weighted_direction(structure):
             structure.direction(wrong)
 
 
+def test_a_direction_alone_stands_for_all_degrees_of_freedom_in_it():
+    plane = so.Structure(np.eye(4), np.eye(4), dofs=[(1, "x"), (1, "ry"), (2, "x"), (2, "ry")])
+    assert list(plane.direction("x")) == [1, 0, 1, 0]
+    assert list(plane.direction({"UX": -1.0, "2 ry": 0.5})) == [-1, 0, -1, 0.5]
+    assert plane.fixed(["ry"]).dofs.names == ("1 x", "2 x")
+    with pytest.raises(so.InputError, match="no DOF has the direction 'z'; there are x, ry"):
+        plane.direction("z")
+
+
+@pytest.mark.parametrize("load", [so.BaseAcceleration, so.BaseDisplacement, so.Gravity])
+def test_a_base_moves_along_a_direction_where_there_are_several(load):
+    """Rotations do not follow a translation of the base."""
+    plane = so.Structure(np.eye(4), np.eye(4), dofs=[(1, "x"), (1, "ry"), (2, "x"), (2, "ry")])
+    with pytest.raises(
+        so.InputError, match=r'directions x, ry: give one, direction=structure\.direction\("x"\)'
+    ) as failure:
+        plane.system(loads=[so.HarmonicLoad(0, 1.0), load(0.1)])
+    assert failure.value.key == ("loads", 1)
+    with pytest.raises(so.InputError, match=r"a structure makes it: structure\.direction\('x'\)"):
+        load(0.1, direction="x")
+    system = plane.system(loads=[load(0.1, direction=plane.direction("x"))])
+    assert not np.any([one.direction[[1, 3]] for one in system.load_components()])
+    plane.fixed(["ry"]).system(loads=[load(0.1)])
+
+
 def test_without_labels_dofs_are_numbers(chain):
     structure = so.Structure(chain.mass, chain.stiffness)
     assert structure.fixed([0, 1]).n == 6
