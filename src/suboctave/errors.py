@@ -9,13 +9,17 @@ import difflib
 import math
 import numbers
 import os
+import re
 import reprlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 Key = tuple[str | int, ...]
+
+#: a degree of freedom as users give it: its number from 0, its name "1042 z", or (node, direction)
+GivenDof: TypeAlias = int | str | tuple[int | str, int | str]
 
 
 class SuboctaveError(Exception):
@@ -104,12 +108,38 @@ def check_numbers(**given: Any) -> None:
             raise InputError(f"{name}={shortened(value)}: give a finite number")
 
 
-def chosen_dof(given: Any, default: int, count: int, name: str = "dof") -> int:
-    """The degree of freedom that a user has given, or else the default; InputError where there is none."""
+def chosen_dof(given: Any, default: int, count: int, name: str = "dof", names: Sequence[str] = ()) -> int:
+    """The degree of freedom that a user has given, see `GivenDof`, or else the default; InputError where there is none.
+
+    `name`: of the argument; `names`: of all degrees of freedom, where they have any.
+    """
     dof = default if given is None else given
+    if isinstance(dof, str | tuple):
+        return _named_dof(dof, name, names)
     if isinstance(dof, bool) or not isinstance(dof, numbers.Integral) or not 0 <= int(dof) < count:
         raise InputError(f"{name}={shortened(dof)} is out of range: there are {count} DOFs, numbered from 0")
     return int(dof)
+
+
+def dof_text(given: str | tuple[Any, ...]) -> str:
+    """The name of a degree of freedom as one text."""
+    return given if isinstance(given, str) else " ".join(map(str, given))
+
+
+def _named_dof(given: str | tuple[Any, ...], name: str, names: Sequence[str]) -> int:
+    text = dof_text(given)
+    if text in names:
+        return names.index(text)
+    alike = [i for i, known in enumerate(names) if _plain_dof(known) == _plain_dof(text)]
+    if len(alike) != 1:
+        has = suggest(text, names) or ": they have no names"
+        raise InputError(f"{name}={shortened(given)} is none of the degrees of freedom{has}")
+    return alike[0]
+
+
+def _plain_dof(text: str) -> str:
+    """A name without what users write in different ways: "1042 z" for "node 1042 Z" and "1042:z"."""
+    return re.sub(r"[\s:,/]+", " ", text.strip().lower()).removeprefix("node ")
 
 
 _shown = reprlib.Repr()
@@ -119,6 +149,14 @@ _shown.maxstring = _shown.maxother = 60
 def shortened(value: Any) -> str:
     """What a user has given, as messages show it: in one line, and only the ends of what is long."""
     return " ".join(_shown.repr(value).split())
+
+
+def damage(error: Exception, most: int = 120) -> str:
+    """What a reader says of a damaged file, in one line of at most so many characters; NumPy takes what is no array
+    for pickled Python objects, and advises to unpickle them.
+    """
+    said = " ".join(str(error).split())[:most]
+    return f"{type(error).__name__}: {'it holds no arrays of numbers' if 'pickle' in said else said}"
 
 
 def suggest(name: str, known: Iterable[str], limit: int = 12) -> str:

@@ -6,10 +6,12 @@ curves can be followed names its equations, a class in `curves.kinds`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-__all__ = ["KINDS", "MOTION_KINDS", "TRACKED_KINDS", "Kind"]
+from suboctave.errors import suggest
+
+__all__ = ["KINDS", "MOTION_KINDS", "TRACKED_KINDS", "Kind", "suggest_kind"]
 
 _WHITE, _INK, _GREY = "#ffffff", "#1a1a1a", "#8c8c8c"
 
@@ -104,6 +106,23 @@ KINDS: dict[str, Kind] = {
     "isola_centre": Kind("a closed branch shrinks to a point", (4, 1, 0), "#F0E442", 1.6, "isola is born"),
     "isola_merging": Kind("a closed branch meets another branch", "^", "#F0E442", 1.15, "isola merges"),
 }  # fmt: skip
+
+#: kinds by the labels of AUTO, MatCont, BifurcationKit and COCO, and by words, in small letters
+_ELSEWHERE = {
+    **dict.fromkeys(("sn", "fold", "lpc", "saddle-node", "limit point"), "LP"),
+    **dict.fromkeys(("flip", "period doubling"), "PD"),
+    **dict.fromkeys(("tr", "torus", "neimark-sacker"), "NS"),
+    **dict.fromkeys(("bpc", "pitchfork", "branch point"), "BP"),
+    **dict.fromkeys(("hb", "h"), "Hopf"),
+    **dict.fromkeys(("cpc", "cusp"), "CP"),
+}
+
+
+def suggest_kind(name: str, known: Iterable[str] = tuple(KINDS)) -> str:
+    """The tail of a message on an unknown kind: what another package's label of it is called here, or the closest."""
+    own = _ELSEWHERE.get(name.strip().lower())
+    return f": {own!r} is what it is called here" if own in (known := list(known)) else suggest(name, known)
+
 
 #: kinds that are located, and whose curves can be followed in two parameters
 TRACKED_KINDS = tuple(name for name, kind in KINDS.items() if kind.equations and kind.choices is None)

@@ -106,7 +106,9 @@ def test_an_interrupted_curve_keeps_what_it_has(limit_point):
         ({"parameter": "omega"}, "omega is free already"),
         ({"parameter": ("F", "F")}, "two different names"),
         ({"parameter": ("F",)}, "two different names"),
-        ({"parameter": ("F", "omega")}, "write omega first"),
+        ({"parameter": ("F", "omega")}, "omega is free anyway: write parameter='F'"),
+        ({"parameter": ("omega", "F")}, "omega is free anyway: write parameter='F'"),
+        ({"parameter": ("F", "omega"), "bounds": ((0.0, 0.2), (0.5, 2.0))}, "write omega first"),
         ({"parameter": ("F", "c")}, "two ranges"),
         ({"parameter": ("F", "c"), "bounds": ((0.0, 1.0), (0.0, 1.0)), "omega": (1.0, 2.0)}, "leave omega= out"),
         ({"bounds": (0.2, 0.3)}, "the bifurcation has F=0.1, outside"),
@@ -152,3 +154,24 @@ def test_events_of_a_dataset_say_what_turns_and_that_stability_goes_on(curve):
     assert [str(text) for text in dataset["event_extreme"].values] == [""]
     after = int(dataset["event_after"][0])
     assert bool(dataset["event_stable_after"][0]) == bool(curve.stable[after])
+
+
+@pytest.mark.parametrize(
+    ("label", "own"),
+    [
+        ("TR", "NS"),
+        ("torus", "NS"),
+        ("SN", "LP"),
+        ("fold", "LP"),
+        ("LPC", "LP"),
+        ("HB", "Hopf"),
+        ("H", "Hopf"),
+        ("BPC", "BP"),
+    ],
+)
+def test_labels_of_other_packages_are_told_by_our_own(limit_point, label, own):
+    curve = so.track(limit_point, "F", (0.05, 0.2), stepping=so.SteppingOptions(max_points=2))
+    with pytest.raises(
+        so.InputError, match=f"unknown kind of bifurcation '{label}': '{own}' is what it is called here"
+    ):
+        curve.bifurcations[label]

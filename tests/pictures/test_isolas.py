@@ -187,3 +187,28 @@ def test_the_report(tmp_path):
     alone = write_report({"none": Isolas({})}, tmp_path / "none.html").read_text(encoding="utf-8")
     assert "1 isola" in alone
     assert "plotly-packed" not in alone.split("<script>")[0]
+
+
+def test_texts_stand_beside_their_own_markers_where_these_are_close():
+    """A birth and a merging a marker apart, on a line: no text is nearer to the other's place."""
+    from matplotlib.figure import Figure
+
+    from suboctave.pictures.drawing import Label
+    from suboctave.pictures.paper import annotate
+    from suboctave.pictures.style import SCREEN
+
+    axes = Figure((6.4, 4.2)).subplots()
+    axes.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0))
+    axes.plot([0.0, 0.48, 0.52, 1.0], [0.3, 0.5, 0.5, 0.7])
+    places = {"born 0.4446": (0.511, 0.5), "merges 0.4449": (0.489, 0.5)}
+    axes.plot(*zip(*places.values(), strict=True), "o", linestyle="None")
+    annotate(axes, [Label(np.array(at), text) for text, at in places.items()], SCREEN)
+
+    def distance(box, at):
+        point = axes.transData.transform(at)
+        return np.hypot(*np.maximum(np.maximum(box.min - point, point - box.max), 0.0))
+
+    for note in axes.texts:
+        box, own = note.get_window_extent(), places[note.get_text()]
+        (other,) = (at for text, at in places.items() if text != note.get_text())
+        assert distance(box, own) <= distance(box, other)

@@ -128,3 +128,15 @@ def test_motions_without_damping_are_not_counted_as_unstable():
     assert f"{len(branch)} points ({branch.verdicts})" in repr(branch)
     damped = so.frequency_response(so.library.duffing(c=0.05, F=0.2), (0.6, 2.0))
     assert damped.verdicts == f"{int((~damped.stable).sum())} unstable"
+
+
+def test_far_too_few_harmonics_are_said_once():
+    system = so.library.duffing(c=0.05, F=0.3)
+    few, enough, adaptive = (so.frequency_response(system, (0.5, 0.8), harmonics=h) for h in (1, 5, "adaptive"))
+    worst = few.truncation.argmax()
+    assert few.truncation[worst] > 0.01
+    (note,) = (text for text in few.warnings if "leaves out" in text)
+    assert f"harmonics=1 leaves out about {few.truncation[worst]:.2g} of the motion" in note
+    assert f"omega = {few.omega[worst]:.6g}" in note
+    for curve in (enough, adaptive):
+        assert not [text for text in curve.warnings if "leaves out" in text]

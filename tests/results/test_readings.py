@@ -220,3 +220,45 @@ def test_elements_are_chosen_by_index(rattling_curve):
         rattling_curve.peak_force("stop")
     with pytest.raises(InputError, match="out of range"):
         rattling_curve.reading("peak_force_7")
+
+
+@pytest.fixture(scope="module")
+def named():
+    parts = np.diag([1.0, 2.0]), 0.1 * np.eye(2), np.array([[2.0, -1.0], [-1.0, 3.0]])
+    system = so.System(*parts, loads=[so.HarmonicLoad(0, 1.0)], dof_names=["21 x", "31 z"])
+    return so.frequency_response(system, (0.5, 0.7), harmonics=1)
+
+
+@pytest.mark.parametrize("name", ["31 z", ("31", "z"), (31, "z"), "node 31 Z", "31:z"])
+def test_a_degree_of_freedom_is_given_by_its_name(named, name, tmp_path):
+    orbit = named.orbits[0]
+    np.testing.assert_array_equal(named.harmonic(1, name), named.harmonic(1, 1))
+    np.testing.assert_array_equal(named.rms(name), named.rms(1))
+    np.testing.assert_array_equal(named.motion_ratio(name, "21 x"), named.motion_ratio(1, 0))
+    assert orbit.amplitude(name) == orbit.amplitude(1)
+    assert orbit.harmonic(1, name) == orbit.harmonic(1, 1)
+    for draw in (lambda: so.plot(named, dof=name), lambda: so.plot_history(orbit, dof=name)):
+        (axes,) = draw().axes
+        assert "x_{1}" in axes.get_ylabel()
+    so.integrate(named.system, omega=0.5, periods=1).plot(tmp_path / "a.png", dof=name)
+
+
+def test_readings_of_named_degrees_of_freedom_are_stored_by_number(named):
+    np.testing.assert_array_equal(named.reading("amplitude_dof31 z"), named.reading("amplitude_dof1"))
+    assert "rms_dof1" in named.to_xarray(readings=["rms_dof31 z"])
+
+
+def test_a_name_that_no_degree_of_freedom_has_is_refused(named, linear):
+    for read in (
+        lambda: named.harmonic(1, "31 y"),
+        lambda: named.orbits[0].amplitude(("31", "y")),
+        lambda: named.reading("rms_dof31 y"),
+        lambda: so.plot(named, dof="31 y"),
+        lambda: so.plot_history(named.orbits[0], dof="31 y"),
+    ):
+        with pytest.raises(InputError, match="did you mean '31 z'"):
+            read()
+    with pytest.raises(InputError, match="they have no names"):
+        linear.rms("31 z")
+    with pytest.raises(InputError, match="give its number"):
+        so.plot(named.to_xarray(), dof="31 z")

@@ -200,6 +200,14 @@ def test_one_file_for_each_matrix(suffix, tmp_path, chain):
     assert caught.value.key[0] in ("mass", "stiffness")
 
 
+def test_advice_to_unpickle_is_not_passed_on(tmp_path):
+    for name in ("a.npz", "a.npy"):
+        (tmp_path / name).write_text("hello")
+        with pytest.raises(so.InputError, match=r"cannot be read as.*no arrays of numbers") as caught:
+            so.read_structure(mass=tmp_path / name, stiffness=tmp_path / name)
+        assert "pickle" not in str(caught.value)
+
+
 def test_a_header_of_matrix_market_is_believed_no_more_than_it_can_hold(tmp_path, chain):
     header = "%%MatrixMarket matrix coordinate real symmetric\n"
     mass = tmp_path / "m.mtx"

@@ -76,6 +76,10 @@ def test_fixed_dofs_are_gone_and_said(structure, chain):
         held.dof(77, "y")
     with pytest.raises(so.InputError, match=r"has no direction 'y'; it has x \(fixed: z\)"):
         held.dof(1042, "y")
+    with pytest.raises(so.InputError, match="all DOFs of node 77 are fixed"):
+        held.fixed(["node 77"])
+    with pytest.raises(so.InputError, match="there is no node 1043; nearest: 1042"):
+        structure.fixed(["node 1043"])
 
 
 def test_a_weighted_direction(structure):
@@ -84,6 +88,31 @@ def test_a_weighted_direction(structure):
     for wrong in ({}, {(1042, "z"): "a"}, {(1042, "z"): np.nan}, [1, 2]):
         with pytest.raises(so.InputError):
             structure.direction(wrong)
+
+
+def test_a_direction_alone_stands_for_all_degrees_of_freedom_in_it():
+    plane = so.Structure(np.eye(4), np.eye(4), dofs=[(1, "x"), (1, "ry"), (2, "x"), (2, "ry")])
+    assert list(plane.direction("x")) == [1, 0, 1, 0]
+    assert list(plane.direction({"UX": -1.0, "2 ry": 0.5})) == [-1, 0, -1, 0.5]
+    assert plane.fixed(["ry"]).dofs.names == ("1 x", "2 x")
+    with pytest.raises(so.InputError, match="no DOF has the direction 'z'; there are x, ry"):
+        plane.direction("z")
+
+
+@pytest.mark.parametrize("load", [so.BaseAcceleration, so.BaseDisplacement, so.Gravity])
+def test_a_base_moves_along_a_direction_where_there_are_several(load):
+    """Rotations do not follow a translation of the base."""
+    plane = so.Structure(np.eye(4), np.eye(4), dofs=[(1, "x"), (1, "ry"), (2, "x"), (2, "ry")])
+    with pytest.raises(
+        so.InputError, match=r'directions x, ry: give one, direction=structure\.direction\("x"\)'
+    ) as failure:
+        plane.system(loads=[so.HarmonicLoad(0, 1.0), load(0.1)])
+    assert failure.value.key == ("loads", 1)
+    with pytest.raises(so.InputError, match=r"a structure makes it: structure\.direction\('x'\)"):
+        load(0.1, direction="x")
+    system = plane.system(loads=[load(0.1, direction=plane.direction("x"))])
+    assert not np.any([one.direction[[1, 3]] for one in system.load_components()])
+    plane.fixed(["ry"]).system(loads=[load(0.1)])
 
 
 def test_without_labels_dofs_are_numbers(chain):
@@ -191,6 +220,32 @@ def test_rayleigh_from_ratios_has_these_ratios(structure, chain):
 def test_rayleigh_refuses_what_has_no_answer(pairs):
     with pytest.raises(so.InputError, match="from_ratios"):
         so.Rayleigh.from_ratios(*pairs)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: so.Rayleigh.from_ratios((39, 0.02), (286, 2.0)),
+        lambda: so.ModalDamping(2.0),
+        lambda: so.ModalDamping([0.01, 2]),
+    ],
+)
+def test_ratios_in_per_cent_are_refused(make):
+    with pytest.raises(so.InputError, match=r"2 is 200 per cent of critical: write 0\.02 for 2 per cent"):
+        make()
+
+
+def test_a_free_body_is_told_by_the_degrees_of_freedom_that_move_most(structure):
+    n = 6
+    springs = 2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
+    springs[0, 0] = springs[-1, -1] = 1.0
+    free = so.Structure(np.eye(n), springs, dofs=[(node, "x") for node in range(1, n + 1)])
+    system = free.system(loads=[so.HarmonicLoad(0, 1.0)])
+    with pytest.raises(so.InputError, match=r"move freely: 1 x by 1, 2 x by 1, 3 x by 1, 4 x by 1, \.\.\.\. Its"):
+        so.frequency_response(system, (0.1, 0.2))
+    two = so.System(np.eye(2), np.zeros((2, 2)), np.zeros((2, 2)), loads=[so.HarmonicLoad(0, 1.0)])
+    with pytest.raises(so.InputError, match=r"DOF \d by 1 \(one of 2 such motions\)"):
+        so.frequency_response(two, (0.1, 0.2))
 
 
 def test_rayleigh_may_depend_on_parameters(structure):
@@ -318,6 +373,10 @@ EYE = np.eye(3)
         (
             {"stiffness": np.array([[1, 0, 0], [0, 1, 2], [0, 2.5, 1]])},
             r"not symmetric: \[1, 2\] is 2, \[2, 1\] is 2.5",
+        ),
+        (
+            {"stiffness": np.array([[1, 0, 0], [0, 1e6, 2e5], [0, 2e5 + 0.02, 1e6]])},
+            r"\[1, 2\] is 200000, \[2, 1\] is 200000, 0.02 apart; that is 2e-08 of the largest .*0.5 \* \(A \+ A.T\)",
         ),
         ({"stiffness": np.tril(np.ones((3, 3)))}, "only the lower triangle has entries"),
         ({"mass": np.triu(np.ones((3, 3)))}, "the mass is not symmetric.*only the upper triangle"),

@@ -261,6 +261,46 @@ def test_mistakes_of_several_dofs(text, words, study_file, suboctave):
         assert word in err, err
 
 
+def test_mistakes_in_one_place_do_not_hide_others(study_file, suboctave):
+    """An unused parameter, and a wrong key of an analysis, leave the rest of the file to be checked."""
+    text = DUFFING.replace("F = 0.3 }", "F = 0.3, idle = 1.0 }").replace("title =", "title = ", 1)
+    text = text.replace("max_step = 0.2", "max_step = 0.2\nharmonics = 0\nobserve = 3", 1)
+    text = (
+        text.replace("omega = [3.0, 0.5]", "omega = [3.0, 3.0]").replace('"LP"', '"TR"').replace("[0.25, 0.4]", "[0.2]")
+    )
+    text = text.replace('parameter = "F"', 'parameter = "idle"').replace(
+        "mass = 1.0", 'mass = 1.0\nunits = "mm, N, kg"'
+    )
+    status, _, err = suboctave("check", study_file(text))
+    assert status == 2
+    for word in (
+        "no unit of time", "'idle' not used", "a whole number of at least 1", "observe=3 is out of range",
+        "two different finite ends", "'NS' is what it is called here", "at least 2 items, not 1",
+    ):  # fmt: skip
+        assert word in err, err
+    assert "7 mistakes" in err
+
+
+def test_of_what_a_value_may_be_the_nearest_is_told(study_file, suboctave):
+    text = (
+        DUFFING
+        + """
+[[analyses]]
+name = "border"
+type = "track"
+start = { analysis = "response", bifurcation = "LP" }
+parameter = "F"
+bounds = [0.2]
+"""
+    )
+    _, _, err = suboctave("check", study_file(text))
+    assert "bounds: must have at least 2 items, not 1" in err
+    assert "1 mistake;" in err
+    _, _, err = suboctave("check", study_file(text.replace("[0.2]", "[[0.2, 0.4], [1.0]]")))
+    assert "bounds[1]: must have at least 2 items, not 1" in err
+    assert "1 mistake;" in err
+
+
 def test_gyroscopic_and_circulatory_matrices_are_accepted(study_file, suboctave):
     text = TWO.replace('[["c", 0.0], [0.0, 0.1]]', '[["c", 0.3], [-0.3, 0.1]]').replace(
         "stiffness = [[1.0, 0.0], [0.0, 1.0]]", "stiffness = [[1.0, 0.1], [-0.1, 1.0]]"

@@ -54,6 +54,11 @@ def test_a_study_finds_places_by_their_labels(study_file, frame):
         np.testing.assert_array_equal(ours, theirs)
 
 
+def test_a_direction_alone_is_one_of_all_its_places(study_file, frame):
+    system = read_study(study_file(STUDY.replace('{ "7 x" = 1.0, "1042 z" = -0.5 }', '"x"'))).system
+    np.testing.assert_array_equal(system.loads[1].place.direction(system.n), frame.direction("x"))
+
+
 def test_a_study_of_a_structure_runs(study_file, frame, suboctave):
     status, out, err = suboctave("run", study_file(STUDY))
     assert status == 0, err
@@ -158,6 +163,7 @@ def test_modal_damping_and_fixed_dofs(study_file, frame):
         ('dof = "1042 z"', 'dof = "1024 z"', ["no node 1024", "1042"], '    { type = "HarmonicLoad"'),
         ('dof = "1042 z"', 'dof = "1042 y"', ["it has x, z"], '    { type = "HarmonicLoad"'),
         ('"node 7 z"', '"node 7"', ["write node and direction"], '    { type = "ElasticStop"'),
+        ('{ "7 x" = 1.0, "1042 z" = -0.5 }', '"y"', ["no DOF has the direction 'y'"], '    { type = "StaticLoad"'),
         ('{ "7 x" = 1.0,', '{ "7 rx" = 1.0,', ["node 7 has no direction 'rx'"], '    { type = "StaticLoad"'),
         ('{ "7 x" = 1.0,', '{ "7 x" = "a",', ["must be a finite number"], '    { type = "StaticLoad"'),
     ],

@@ -33,6 +33,9 @@ from suboctave.options import RunOptions
 from suboctave.progress import reporting
 from suboctave.results.branch import Branch
 
+#: truncation estimate from which a fixed number of harmonics is said to be too small: peaks are wrong by per cents
+_FEW = 1e-2
+
 
 class SearchOptions(RunOptions, total=False):
     """Options of all verbs that follow curves, searches over a design parameter among them."""
@@ -234,6 +237,19 @@ class CurveRun:
         if self.settings.report is not None:
             self.settings.report.report(share, where)
 
+    def _truncated(self, trace: Trace) -> list[str]:
+        """One sentence where a given number of harmonics is far too small somewhere on the curve."""
+        if isinstance(self.harmonics, AdaptiveHarmonics) or not trace.points:
+            return []
+        worst = max((point.orbit for point in trace.points), key=lambda orbit: orbit.truncation)
+        if not worst.truncation > _FEW:
+            return []
+        value = worst.omega if self.name == "omega" else worst.values[self.name]
+        return [
+            f"harmonics={self.harmonics} leaves out about {worst.truncation:.2g} of the motion at {self.name} = "
+            f'{value:.6g}, the most on this curve: give harmonics="adaptive", or a larger number'
+        ]
+
     def branch(self, trace: Trace) -> Branch:
         """What was followed as a branch, with what it was computed with."""
         options = options_of(self.settings, self.harmonics, {self.name: self.ends})
@@ -246,5 +262,5 @@ class CurveRun:
         met = (None if item is None else Junction.of(item) for item in (trace.departs, trace.arrives))
         return Branch(
             self.system, self.name, trace.points, bifurcations, events, trace.closed, trace.endings,
-            self.settings.observe, options, tuple(trace.sentences), trace.audit, *met,
+            self.settings.observe, options, (*trace.sentences, *self._truncated(trace)), trace.audit, *met,
         )  # fmt: skip

@@ -257,11 +257,19 @@ def _free(item: Bifurcation, parameter: Any, bounds: Any, omega: Any) -> tuple[t
         names = both
         for name in names:
             check_parameter(system, name)
+        single = not isinstance(bounds, Sequence) or len(bounds) != 2 or any(is_number(b) for b in bounds)
+        if "omega" in names and single:
+            (other,) = (name for name in names if name != "omega")
+            raise InputError(
+                f"omega is free anyway: write parameter={other!r} with bounds=(from, to), and omega=(from, to) to "
+                f"bound omega; or two ranges, parameter=('omega', {other!r}) with bounds=((from, to), (from, to)), not "
+                f"{shortened(bounds)}"
+            )
         if names[1] == "omega":
-            raise InputError(f"write omega first: parameter=('omega', {names[0]!r})")
+            raise InputError(f"write omega first, in parameter=('omega', {names[0]!r}) and in bounds")
         if omega is not None:
             raise InputError("with two parameters named their ranges are in bounds: leave omega= out")
-        if not isinstance(bounds, Sequence) or len(bounds) != 2 or any(is_number(b) for b in bounds):
+        if single:
             raise InputError(f"bounds of two parameters are two ranges, ((from, to), (from, to)), not {bounds!r}")
         ranges = {name: check_bounds(system, name, r) for name, r in zip(names, bounds, strict=True)}
     for name, ends in ranges.items():

@@ -18,7 +18,7 @@ from suboctave.harmonic.linear_part import LinearPart
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.perturbation import Kind
 from suboctave.harmonic.waves import Waves
-from suboctave.kinds import KINDS, TRACKED_KINDS
+from suboctave.kinds import KINDS, TRACKED_KINDS, suggest_kind
 from suboctave.lazy import lazy
 
 #: kinds at which a curve meets a contact, without having to change in number or stability
@@ -287,7 +287,7 @@ class BifurcationList:
     def __getitem__(self, key: str | int) -> list[Bifurcation] | Bifurcation:
         if isinstance(key, str):
             if key not in self._known:
-                raise InputError(f"unknown kind of bifurcation {key!r}{suggest(key, list(self._known))}")
+                raise InputError(f"unknown kind of bifurcation {key!r}{suggest_kind(key, self._known)}")
             return [item for item in self.met if item.kind == key]
         return self._items[key]
 

@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from suboctave.errors import InputError, shortened
+from suboctave.errors import GivenDof, InputError, chosen_dof, shortened
 from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis, harmonic_index, to_complex, to_real
 from suboctave.harmonic.energy import fed
 from suboctave.harmonic.evaluation import BalanceState, HarmonicBalance
@@ -132,7 +132,7 @@ class PeriodicOrbit:
         result = self._linear.shaped(np.real(waves @ self._moving)).T
         return result[:, 0] if np.ndim(t) == 0 else result
 
-    def harmonic(self, k: float, dof: int = 0) -> complex:
+    def harmonic(self, k: float, dof: GivenDof = 0) -> complex:
         """Complex amplitude of the component at `k omega`; k may be a fraction for sub-harmonic motions.
 
         Raises
@@ -144,19 +144,19 @@ class PeriodicOrbit:
         amplitudes = self._along(dof)
         return complex(amplitudes[at]) if at <= self.basis.harmonics else 0.0 + 0.0j
 
-    def amplitude(self, dof: int = 0) -> float:
+    def amplitude(self, dof: GivenDof = 0) -> float:
         """Largest |x| of a DOF over the motion's period, found by Newton's method on dx/dt = 0."""
         return peak(self._along(dof))[0]
 
-    def velocity_amplitude(self, dof: int = 0) -> float:
+    def velocity_amplitude(self, dof: GivenDof = 0) -> float:
         """Largest |dx/dt| of a DOF over the motion's period, as `amplitude`."""
         return peak(self._along(dof, 1))[0]
 
-    def acceleration_amplitude(self, dof: int = 0) -> float:
+    def acceleration_amplitude(self, dof: GivenDof = 0) -> float:
         """Largest second derivative of x of a DOF, in modulus, over the motion's period, as `amplitude`."""
         return peak(self._along(dof, 2))[0]
 
-    def rms(self, dof: int = 0, derivative: int = 0) -> float:
+    def rms(self, dof: GivenDof = 0, derivative: int = 0) -> float:
         """Root mean square of x over the period, its mean included, or of a derivative by t.
 
         By Parseval `sqrt(c_0^2 + sum_k |c_k|^2 / 2)`, exact for the harmonics that the motion has.
@@ -173,14 +173,13 @@ class PeriodicOrbit:
         """State `(x(0), dx/dt(0))`, shape (2 n,), from which time integration runs into this motion."""
         return np.concatenate((self.displacement(0.0), self.velocity(0.0)))
 
-    def _along(self, dof: int, derivative: int = 0) -> ComplexArray:
+    def _along(self, dof: GivenDof, derivative: int = 0) -> ComplexArray:
         """Complex amplitudes of one of the structure's DOFs, or of a derivative of it by t, shape (H + 1,)."""
         n = self.balance.system.n
-        if not -n <= dof < n:
-            raise InputError(
-                f"dof={dof} is out of range: the motion has {n} DOF{'s' if n > 1 else ''}, numbered from 0"
-            )
-        c = self.along(_unit(n, dof))
+        if isinstance(dof, int | np.integer) and -n <= dof < 0:
+            dof = int(dof) + n
+        place = chosen_dof(dof, 0, n, names=self.balance.system.dof_names)
+        c = self.along(_unit(n, place))
         return c * (1j * self.basis.multiples * self.omega) ** derivative if derivative else c
 
     def __repr__(self) -> str:

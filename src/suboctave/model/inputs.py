@@ -19,6 +19,8 @@ from suboctave.model.system import System
 
 #: the largest count of anything
 _MOST = 100_000_000
+#: DOFs of a free motion that a message names
+_MOST_SHOWN = 4
 #: DOFs up to which the stiffness is examined for motions that nothing holds
 _MOST_EXAMINED = 400
 
@@ -60,12 +62,23 @@ def _check_held(system: System) -> None:
     if not len(free):
         return
     held = np.vstack([np.zeros((0, system.n)), *(e.inputs(system.n) * scale for e in system.elements)])
-    if np.linalg.matrix_rank(held @ free.T, tol=1e-10 * max(1e-300, float(np.abs(held).max(initial=0.0)))) < len(free):
-        shape = ", ".join(f"{v:.3g}" for v in free[0] * scale / np.abs(free[0] * scale).max())
+    _, resisted, ways = np.linalg.svd(held @ free.T)
+    rank = int(np.count_nonzero(resisted > 1e-10 * max(1e-300, float(np.abs(held).max(initial=0.0)))))
+    if rank < len(free):
         raise InputError(
-            f"the structure can move freely along ({shape}): its stiffness is singular and no element holds it, so "
-            "that the mean position is not determined. Hold it by a spring, or write it in relative displacements"
+            f"the structure can move freely: {_shape(ways[-1] @ free * scale, system.dof_names)}"
+            f"{f' (one of {len(free) - rank} such motions)' if len(free) - rank > 1 else ''}. Its stiffness is "
+            "singular and no element holds it, so that the mean position is not determined. Hold it by a spring, or "
+            "write it in relative displacements"
         )
+
+
+def _shape(shape: Array, names: Sequence[str]) -> str:
+    """A shape by the degrees of freedom that move most in it."""
+    order = np.argsort(-np.round(np.abs(shape) / np.abs(shape).max(), 6), kind="stable")
+    shape = shape / shape[order[0]]
+    moving = [f"{names[i] if names else f'DOF {i}'} by {shape[i]:.3g}" for i in order if abs(shape[i]) > 1e-6]
+    return ", ".join(moving[:_MOST_SHOWN]) + ", ..." * (len(moving) > _MOST_SHOWN)
 
 
 def check_parameter(system: System, name: str) -> None:
@@ -85,14 +98,9 @@ def check_count(name: str, value: Any, least: int = 1) -> int:
     return int(value)
 
 
-def observed_dof(system: System, observe: Any) -> int:
+def observed_dof(system: System, observe: Any, name: str = "observe") -> int:
     """The degree of freedom that is observed, by its number or its name; by default the system's."""
-    if isinstance(observe, str):
-        if observe not in system.dof_names:
-            has = suggest(observe, system.dof_names) or ": they have no names"
-            raise InputError(f"observe={observe!r} is none of the degrees of freedom{has}")
-        return system.dof_names.index(observe)
-    return chosen_dof(observe, system.observed_dof, system.n, "observe")
+    return chosen_dof(observe, system.observed_dof, system.n, name, system.dof_names)
 
 
 def check_element(system: System, element: Any, gapped: Sequence[int] | None = None) -> int:

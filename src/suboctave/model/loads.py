@@ -27,6 +27,8 @@ from suboctave.model.elements.base import Array, Dof, Place, required
 from suboctave.model.expressions.coefficients import ZERO, Coefficient, Number, coefficient, named_coefficient
 from suboctave.model.matrices import MatrixCoefficient
 
+#: translations and rotations, the last words of names such as "1042 z"
+DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 #: far above what harmonic balance has unknowns for; angles of higher ones would lose digits in time integration
 _HIGHEST = 10_000
 #: mass, damping, stiffness and structural damping of the structure that a load acts on
@@ -77,6 +79,9 @@ class Load(Recorded, ABC, family="load"):
 
     def check_elements(self, n: int, elements: Sequence[Any]) -> None:
         """Refuse elements that the load cannot act beside."""
+
+    def check_names(self, names: Sequence[str]) -> None:
+        """Refuse a load that does not say where it acts, where the names of the DOFs show that it must."""
 
     def _take(self, **given: Any) -> None:
         """Keep expressions by their names; all of them must be given."""
@@ -211,10 +216,23 @@ class RotatingUnbalance(Load):
 
 
 class _WithMatrices(Load):
-    """A load along `M r`, `C r` or `K r`; `direction` r (n,), None for all DOFs alike."""
+    """A load along `M r`, `C r` or `K r`; `direction` r (n,), None for all DOFs alike; refused
+    where these are named with several directions.
+    """
 
     def __init__(self, direction: ArrayLike | None) -> None:
         self.vector = None if direction is None else Place(type(self).__name__, None, direction)
+
+    def check_names(self, names: Sequence[str]) -> None:
+        """Refuse a translation of all DOFs alike where their names have several directions."""
+        there = {name.rpartition(" ")[2] for name in names}
+        several = [direction for direction in DIRECTIONS if direction in there]
+        if self.vector is None and len(several) > 1:
+            raise InputError(
+                f"{self.label} moves all DOFs alike unless told, and here they have the directions "
+                f'{", ".join(several)}: give one, direction=structure.direction("{several[0]}"); in a study file '
+                f'direction = "{several[0]}"'
+            )
 
     def direction(self, n: int) -> Array:
         """The vector r (n,) of a rigid translation."""

@@ -87,6 +87,9 @@ class System:
             dof_names=_read_dof_names(dof_names, read.n),
             units=UnitSystem.of(units),
         )
+        for i, load in enumerate(self.loads):  # not of known systems, which are read from files
+            with located("loads", i):
+                load.check_names(self.dof_names)
         self._check_values(self.parameters)
 
     @classmethod

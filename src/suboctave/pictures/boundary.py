@@ -339,7 +339,7 @@ def plot_space(
     title, size
         As in `suboctave.plot`.
     """
-    view = View(**dict[str, Any](options))
+    view = View(**dict[str, Any](options)).placed(several_of(curves))
     for name, angle in (("elevation", elevation), ("azimuth", azimuth)):
         if isinstance(angle, bool) or not isinstance(angle, int | float) or not np.isfinite(angle):
             raise InputError(f"{name} is an angle in degrees, not {angle!r}")

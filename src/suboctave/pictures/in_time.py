@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from suboctave.errors import InputError, chosen_dof, suggest
+from suboctave.errors import GivenDof, InputError, chosen_dof, suggest
 from suboctave.pictures import style
 from suboctave.pictures.boundary import boundary_drawing, datasets_of, is_boundary
 from suboctave.pictures.drawing import STROKES, Axis, Band, Entry, Frame, Guide, Markers, Polyline, Raster, dot, plain
@@ -37,7 +37,9 @@ _APERIODIC = -1
 
 
 @picture((7.2, 3.2))
-def plot_trajectory(trajectory: xarray.Dataset, *, dof: int | None = None, quantity: str = "displacement") -> Layout:
+def plot_trajectory(
+    trajectory: xarray.Dataset, *, dof: GivenDof | None = None, quantity: str = "displacement"
+) -> Layout:
     """The displacement (or "velocity") of one degree of freedom over time, instants of phase 0 marked."""
     check_quantity(quantity, ("displacement", "velocity"))
     dof = checked_dof(trajectory, dof)
@@ -52,7 +54,7 @@ def plot_trajectory(trajectory: xarray.Dataset, *, dof: int | None = None, quant
 
 
 @picture((5.2, 4.6), by_kind=True)
-def plot_sections(sections: xarray.Dataset, *, dof: int | None = None) -> Layout:
+def plot_sections(sections: xarray.Dataset, *, dof: GivenDof | None = None) -> Layout:
     """Stroboscopic points in the plane of displacement and velocity of one degree of freedom, coloured by period."""
     dof = checked_dof(sections, dof)
     at = np.array([_along(sections[name], dof) for name in ("displacement", "velocity")])
@@ -73,7 +75,7 @@ def plot_brute_force(
     curves: Any = None,
     quantity: str = "amplitude",
     starts: Sequence[str] | None = None,
-    dof: int | None = None,
+    dof: GivenDof | None = None,
 ) -> Layout:
     """The motions over the parameter that was varied, with branches beneath if any are given.
 
@@ -120,7 +122,7 @@ def plot_stepped_sine(
     curves: Any = None,
     measured: Any = None,
     harmonic: float = 1,
-    dof: int | None = None,
+    dof: GivenDof | None = None,
     xlim: Sequence[float] | None = None,
     ylim: Sequence[float] | None = None,
 ) -> Layout:
@@ -247,9 +249,11 @@ def _frequency_axis(dataset: xarray.Dataset) -> str:
     return rf"$\omega$ ({declared.frequency})" if declared else r"$\omega$"
 
 
-def checked_dof(dataset: xarray.Dataset, dof: int | None) -> int:
+def checked_dof(dataset: xarray.Dataset, dof: GivenDof | None) -> int:
     """The degree of freedom that is drawn, default the observed one; InputError where there is none."""
-    return chosen_dof(dof, int(dataset.attrs["observed"]), int(dataset.attrs["dofs"]))
+    given = dataset["dof"].to_numpy().tolist() if "dof" in dataset.coords else []
+    names = [name for name in given if isinstance(name, str)]
+    return chosen_dof(dof, int(dataset.attrs["observed"]), int(dataset.attrs["dofs"]), names=names)
 
 
 def _along(variable: xarray.DataArray, dof: int) -> np.ndarray:

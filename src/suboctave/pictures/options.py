@@ -6,14 +6,14 @@ The public verbs take these as keywords; `View` and `MotionView` hold them once 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, Annotated, Any, TypedDict
 
 import numpy as np
 
-from suboctave.errors import InputError, suggest
+from suboctave.errors import GivenDof, InputError, chosen_dof, suggest
 from suboctave.pictures.style import period_of
 from suboctave.store.layout import QUANTITIES, check_component, coordinate, has_component, reading_name
 from suboctave.units import UnitSystem
@@ -74,7 +74,7 @@ class SpaceOptions(UnitOptions, total=False):
         "two load periods, which is zero for those of one.",
     ]
     element: Annotated[int | None, "Of which element, by index."]
-    dof: Annotated[int | None, "Of which degree of freedom; default the observed one."]
+    dof: Annotated[GivenDof | None, "Of which degree of freedom, its number or its name; default the observed one."]
 
 
 class CurveOptions(SpaceOptions, total=False):
@@ -93,8 +93,9 @@ class MotionOptions(UnitOptions, PageOptions, total=False):
 
     points: Annotated[Sequence[int] | None, "Which points of the branches, by index."]
     dof: Annotated[
-        int | None,
-        "Degree of freedom; default the one that the branch observes, of an orbit alone that of its first load.",
+        GivenDof | None,
+        "Degree of freedom, its number or its name; default the one that the branch observes, of an orbit alone that "
+        "of its first load.",
     ]
     overlay: Annotated[bool | None, "All in one frame; else each in its own, on shared axes."]
     labels: Annotated[Sequence[str] | None, "Names of the motions."]
@@ -174,7 +175,7 @@ class View(Units):
     quantity: str = ""
     harmonic: float | None = None
     element: int | None = None
-    dof: int | None = None
+    dof: GivenDof | None = None
     xlim: Sequence[float] | None = None
     ylim: Sequence[float] | None = None
     marks: Sequence[str] | None = None
@@ -204,7 +205,27 @@ class View(Units):
     def variable(self) -> str:
         """The variable of the dataset that is drawn: the name of a reading."""
         numbers = {"": None, "element": self.element, "harmonic": self.multiple}
-        return reading_name(self.quantity, numbers[QUANTITIES[self.quantity].numbered], self.dof)
+        return reading_name(self.quantity, numbers[QUANTITIES[self.quantity].numbered], self.number)
+
+    @property
+    def number(self) -> int | None:
+        """The number of the degree of freedom that was chosen."""
+        if isinstance(self.dof, str | tuple):
+            raise InputError(f"dof={self.dof!r}: curves laid out as datasets have no names of DOFs; give its number")
+        return self.dof
+
+    def placed(self, curves: Iterable[Any]) -> View:
+        """The view with the number of the degree of freedom in the place of its name, as the system of the first of
+        these curves that has one names it.
+        """
+        if not isinstance(self.dof, str | tuple):
+            return self
+        members = (item for curve in curves for item in (curve, *getattr(curve, "branches", ())))
+        systems = (getattr(item, "system", None) for item in members)  # that of a dataset is its name
+        system: Any = next((one for one in systems if hasattr(one, "dof_names")), None)
+        if system is None:
+            return self
+        return replace(self, dof=chosen_dof(self.dof, 0, system.n, names=system.dof_names))
 
     @property
     def multiple(self) -> float:
@@ -247,7 +268,7 @@ class View(Units):
     def label(self, datasets: Sequence[xarray.Dataset]) -> str:
         """What the axis of the quantity says, without a unit; the curves may observe different DOFs."""
         dofs = list(dict.fromkeys(int(dataset.attrs.get("observed_dof", 0)) for dataset in datasets))
-        dofs = dofs if self.dof is None else [self.dof]
+        dofs = dofs if self.number is None else [self.number]
         x = "x_i" if len(dofs) > 1 else "x" if int(datasets[0].attrs.get("dofs", 1)) == 1 else f"x_{{{dofs[0]}}}"
         says = _MEAN if self.quantity == "harmonic" and self.multiple == 0.0 else QUANTITIES[self.quantity].axis
         text = says.format(x=x, k=shown_multiple(self.multiple), e=self.element)

@@ -476,15 +476,17 @@ def _frame_of(sheet: style.Sheet) -> dict[str, Any]:
 def annotate(axes: Axes, labels: Sequence[Label], look: style.Look) -> None:
     """Write texts beside their places; the same text at the same place once.
 
-    Of the sides of a place the one is taken on which the text covers the fewest lines, markers and other texts.
+    Of the sides of a place the one is taken on which the text covers the fewest lines, markers and other texts, and is
+    not nearer to the place of another text.
     """
     unit, window, legend = axes.figure.dpi / 72.0, axes.get_window_extent(), axes.get_legend()
     taken = [] if legend is None else [legend.get_window_extent()]
     gap = 0.75 * style.MARKER_SIZE * look.marker
     looks: dict[str, Any] = {"fontsize": look.small, "color": style.INK, "zorder": 7, "gid": "label"}
     done: list[tuple[str, np.ndarray]] = []
-    for label in labels:
-        point = axes.transData.transform(label.at)
+    points = [axes.transData.transform(label.at) for label in labels]
+    for label, point in zip(labels, points, strict=True):
+        others = [there for other, there in zip(labels, points, strict=True) if other.text != label.text]
         again = any(label.text == text and np.hypot(*(point - there)) < 3.0 * unit for text, there in done)
         if again or not np.isfinite(point).all():
             continue
@@ -498,12 +500,19 @@ def annotate(axes: Axes, labels: Sequence[Label], look: style.Look) -> None:
             box = note.get_window_extent()
             overlaps = box.padded(_CLEAR * unit).count_overlaps(taken)
             cost = 40.0 * _covered(axes, box) + 400.0 * (overlaps + _leaves(box, window))
+            own = _distance(box, point)
+            cost += 200.0 * any(_distance(box, there) < own for there in others)
             costs[note] = cost + 25.0 * _leaves(box, window.padded(-_TICKS * unit)) + 0.1 * rank + 5.0 * distance
         best = min(costs, key=lambda note: costs[note])
         for note in costs:
             if note is not best:
                 note.remove()
         taken.append(best.get_window_extent())
+
+
+def _distance(box: Bbox, point: np.ndarray) -> float:
+    """From a point to a box, in pixels; zero inside."""
+    return float(np.hypot(*np.maximum(np.maximum(box.min - point, point - box.max), 0.0)))
 
 
 def _covered(axes: Axes, box: Bbox) -> int:

@@ -289,7 +289,7 @@ def plot(
         labels = getattr(given[0], "legend", None) if labels is None else labels
         if options.get("marks") is None:
             options["marks"] = getattr(given[0], "marks", None)
-    view = View(**dict[str, Any](options))
+    view = View(**dict[str, Any](options)).placed(given)
     datasets = datasets_of(curves, view)
     if any(is_isolas(dataset) for dataset in datasets):  # in the plane, without the closed branches
         datasets = [dataset for dataset in datasets if "isola" not in dataset.attrs]

@@ -17,7 +17,7 @@ from suboctave.continuation.ending import Ending, interruption_of, sentence
 from suboctave.continuation.problem import Array
 from suboctave.curves.junction import Junction, period_name
 from suboctave.curves.trace import Audit, BranchPoint, TrackedPoint
-from suboctave.errors import InputError, suggest
+from suboctave.errors import GivenDof, InputError, suggest
 from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.kinds import KINDS
@@ -213,9 +213,9 @@ class Branch(CurveTables, BranchReadings):
         """Largest |x| of the observed DOF over one response period, shape (len,)."""
         return np.array([p.orbit.amplitude(self.observe) for p in self.points])
 
-    def harmonic(self, k: float, dof: int | None = None) -> ComplexArray:
+    def harmonic(self, k: float, dof: GivenDof | None = None) -> ComplexArray:
         """Complex amplitude of the component at `k omega` (of the observed DOF unless told), shape (len,)."""
-        where = self.observe if dof is None else dof
+        where = self._dof(dof)
         return np.array([p.orbit.harmonic(k, where) for p in self.points])
 
     @cached_property

@@ -23,7 +23,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from suboctave.bifurcation.gaps import contact_side, levels
-from suboctave.errors import InputError, shortened, suggest
+from suboctave.errors import GivenDof, InputError, chosen_dof, shortened, suggest
 from suboctave.harmonic.basis import Array, ComplexArray, harmonic_index, to_complex
 from suboctave.harmonic.energy import action, damping_ratio, mean_energy, modal_amplitude
 from suboctave.harmonic.orbit import PeriodicOrbit, force_along
@@ -49,7 +49,7 @@ if TYPE_CHECKING:
 def _of_a_dof(what: str, meaning: str) -> Callable[..., Array]:
     """A method that reads something off one DOF."""
 
-    def read(self: BranchReadings, dof: int | None = None) -> Array:
+    def read(self: BranchReadings, dof: GivenDof | None = None) -> Array:
         return self._of(what, dof)
 
     read.__name__, read.__doc__ = what, meaning
@@ -69,8 +69,15 @@ class BranchReadings:
     def _over(self, read: Callable[[PeriodicOrbit], float]) -> Array:
         return np.array([read(orbit) for orbit in self.orbits], dtype=float)
 
-    def _of(self, what: str, dof: int | None = None, number: float | None = None) -> Array:
-        return Reading(what, dof, number).of(self.orbits, self.observe)
+    def _of(self, what: str, dof: GivenDof | None = None, number: float | None = None) -> Array:
+        return Reading(what, self._dof(dof), number).of(self.orbits, self.observe)
+
+    def _dof(self, given: GivenDof | None) -> int:
+        """The number of a degree of freedom that was given, one from the end too; default the observed one."""
+        n, names = self.system.n, self.system.dof_names
+        if isinstance(given, int | np.integer) and -n <= given < 0:
+            given = int(given) + n
+        return chosen_dof(given, self.observe, n, names=names)
 
     rms = _of_a_dof("rms", "Root mean square of the displacement over a period, its mean included.")
     velocity = _of_a_dof("velocity", "Largest |dx/dt| over a period.")
@@ -78,7 +85,7 @@ class BranchReadings:
     acceleration = _of_a_dof("acceleration", "Largest acceleration, in modulus, over a period.")
     acceleration_rms = _of_a_dof("acceleration_rms", "Root mean square of the acceleration.")
 
-    def phase(self, k: float = 1, dof: int | None = None) -> Array:
+    def phase(self, k: float = 1, dof: GivenDof | None = None) -> Array:
         """Phase of the component at `k omega` in radians, continuous along the branch from a value in (-pi, pi].
 
         The component is `|c| cos(k omega t + phase)`: negative where the response lags behind `cos(k omega t)`. nan
@@ -123,22 +130,23 @@ class BranchReadings:
         r = translation(self.system.n, direction)
         return _somewhere(self._over(lambda orbit: _force_ratio(orbit, harmonic, r)), harmonic)
 
-    def motion_ratio(self, dof: int, reference: int, harmonic: float | None = 1) -> Array:
+    def motion_ratio(self, dof: GivenDof, reference: GivenDof, harmonic: float | None = 1) -> Array:
         """Amplitude of one DOF over that of another, at `harmonic`, or by largest values (None)."""
+        above, base = self._dof(dof), self._dof(reference)
 
         def size(orbit: PeriodicOrbit, of: int) -> float:
             return orbit.amplitude(of) if harmonic is None else abs(orbit.harmonic(harmonic, of))
 
-        below = self._over(lambda orbit: size(orbit, reference))
-        return self._over(lambda orbit: size(orbit, dof)) / np.where(below == 0.0, np.nan, below)
+        below = self._over(lambda orbit: size(orbit, base))
+        return self._over(lambda orbit: size(orbit, above)) / np.where(below == 0.0, np.nan, below)
 
     def reading(self, name: str) -> Array:
         """A read-off by the name under which `to_xarray` and `to_dataframe` store it, such as "velocity_rms".
 
         With a number where it needs one: "harmonic_3", "harmonic_1/2", "peak_force_0" (element 0), and of another DOF
-        than the observed one with the ending "_dof2".
+        than the observed one with the ending "_dof2", or "_dof21 x" where DOFs have names.
         """
-        return _on_points(self, read_reading(name))
+        return _on_points(self, read_reading(name).placed(self.system))
 
     def available_readings(self) -> list[str]:
         """Names of the read-offs of this branch at the observed DOF, first harmonics and all elements included."""
@@ -159,7 +167,7 @@ class Reading:
     """One read-off: what, of which DOF (None: the observed one), and the harmonic or element where it needs one."""
 
     what: str
-    dof: int | None = None
+    dof: int | str | None = None
     number: float | None = None
 
     @property
@@ -167,9 +175,15 @@ class Reading:
         """The name that it is stored under."""
         return reading_name(self.what, self.number, self.dof)
 
+    def placed(self, system: System) -> Reading:
+        """The same with the number of its DOF in the place of a name."""
+        if not isinstance(self.dof, str):
+            return self
+        return replace(self, dof=chosen_dof(self.dof, 0, system.n, names=system.dof_names))
+
     def of(self, orbits: Sequence[PeriodicOrbit], observe: int) -> Array:
         """Its values, shape (len(orbits),)."""
-        dof = observe if self.dof is None else self.dof
+        dof: Any = observe if self.dof is None else self.dof
         if QUANTITIES[self.what].numbered == "element" and len(orbits):
             system = orbits[0].balance.system
             gapped = gapped_elements(system) if self.what in _OF_A_GAP else None
@@ -236,7 +250,7 @@ _READ: Mapping[str, Callable[[PeriodicOrbit, int, float], Any]] = {
 }
 _OF_A_DOF = ("rms", "velocity", "velocity_rms", "acceleration", "acceleration_rms")
 _OF_A_GAP = ("contact_share", "impacts")
-_NAME = re.compile(r"(?P<what>[a-z]+(?:_[a-z]+)*?)(?:_(?P<number>\d+(?:\.\d+|/0*[1-9]\d*)?))?(?:_dof(?P<dof>\d+))?")
+_NAME = re.compile(r"(?P<what>[a-z]+(?:_[a-z]+)*?)(?:_(?P<number>\d+(?:\.\d+|/0*[1-9]\d*)?))?(?:_dof(?P<dof>.+))?")
 
 
 def read_reading(name: str) -> Reading:
@@ -257,7 +271,8 @@ def read_reading(name: str) -> Reading:
     number = None if match["number"] is None else float(Fraction(match["number"]))
     if kind.numbered == "element" and number is not None and number % 1.0:
         raise InputError(f"the reading {name!r} needs the index of an element, a whole number")
-    return Reading(what, None if match["dof"] is None else int(match["dof"]), number)
+    dof = match["dof"]
+    return Reading(what, int(dof) if dof is not None and dof.isdecimal() else dof, number)
 
 
 def shared(names: Iterable[str] | bool, periods: Sequence[int]) -> list[list[str] | bool]:
@@ -307,7 +322,7 @@ def _listed(branch: Any, names: Iterable[str] | bool) -> list[Reading]:
     if not isinstance(names, Iterable):
         raise InputError(f"readings must be names, or True for all, not {shortened(names)}")
     chosen = [names] if isinstance(names, str) else list(names)
-    return [read_reading(name) for name in dict.fromkeys(chosen)]
+    return [read_reading(name).placed(branch.system) for name in dict.fromkeys(chosen)]
 
 
 # ----------------------------------------------------------------------------------- contacts: force, duration, impacts

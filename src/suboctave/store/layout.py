@@ -293,7 +293,7 @@ QUANTITIES: Mapping[str, Quantity] = {
 }
 
 
-def reading_name(what: str, number: float | None = None, dof: int | None = None) -> str:
+def reading_name(what: str, number: float | None = None, dof: int | str | None = None) -> str:
     """The name that a read-off is stored under: "velocity", "harmonic_3", "harmonic_0.5", "peak_force_0_dof1".
 
     `number` is exact in it: 1/3 is 0.3333333333333333.

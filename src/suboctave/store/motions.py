@@ -30,7 +30,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from suboctave.bifurcation.gaps import contact_side
-from suboctave.errors import InputError, chosen_dof
+from suboctave.errors import GivenDof, InputError, chosen_dof, dof_text
 from suboctave.harmonic.basis import Array, to_real
 from suboctave.harmonic.orbit import PeriodicOrbit, force_along
 from suboctave.model.elements.coupled import reads
@@ -50,7 +50,7 @@ _SMOOTH, _PER_HARMONIC = 400, 8
 
 
 def motion_datasets(
-    motions: Any, points: Sequence[int] | None = None, dof: int | None = None, elements: Iterable[int] = ()
+    motions: Any, points: Sequence[int] | None = None, dof: GivenDof | None = None, elements: Iterable[int] = ()
 ) -> list[xarray.Dataset]:
     """Motions given in any form as datasets.
 
@@ -62,7 +62,8 @@ def motion_datasets(
     points
         Indices of the points of a branch.
     dof
-        Degree of freedom; default that which the branch observes, of a motion alone that of its first load.
+        Degree of freedom, its number or its name; default that which the branch observes, of a motion alone that of
+        its first load.
     elements
         Indices of the elements whose forces are wanted.
 
@@ -87,7 +88,7 @@ def _is_branch(item: Any) -> bool:
 
 
 def _laid_out(
-    item: Any, points: Sequence[int] | None, dof: int | None, elements: tuple[int, ...]
+    item: Any, points: Sequence[int] | None, dof: GivenDof | None, elements: tuple[int, ...]
 ) -> Iterator[xarray.Dataset]:
     import xarray
 
@@ -112,12 +113,13 @@ def _laid_out(
         yield motion_dataset(orbit, dof, kind=str(getattr(item, "kind", "")), elements=elements)
 
 
-def _checked(dataset: xarray.Dataset, dof: int | None, elements: tuple[int, ...]) -> xarray.Dataset:
+def _checked(dataset: xarray.Dataset, dof: GivenDof | None, elements: tuple[int, ...]) -> xarray.Dataset:
     if dataset.attrs.get("contents") != _CONTENTS:
         raise InputError("this dataset is no motion: give the branch with points=, or one of its orbits")
     check_layout(dataset.attrs)
     there = int(dataset.attrs["dof"])
-    if dof is not None and dof != there:
+    given = dof_text(dof) if isinstance(dof, str | tuple) else dof
+    if given not in (None, there, dataset.attrs.get("dof_name")):
         raise InputError(f"this dataset holds the motion of DOF {there}, not of DOF {dof}")
     missing = set(elements) - {int(index) for index in dataset["element"].to_numpy()}
     if missing:
@@ -126,7 +128,7 @@ def _checked(dataset: xarray.Dataset, dof: int | None, elements: tuple[int, ...]
 
 
 def motion_dataset(
-    orbit: PeriodicOrbit, dof: int | None = None, *, kind: str = "", elements: Iterable[int] = ()
+    orbit: PeriodicOrbit, dof: GivenDof | None = None, *, kind: str = "", elements: Iterable[int] = ()
 ) -> xarray.Dataset:
     """A motion as a labelled dataset; the layout is described at the top of this module.
 
@@ -138,7 +140,7 @@ def motion_dataset(
     import xarray
 
     system = orbit.balance.system
-    chosen = chosen_dof(dof, system.observed_dof, system.n)
+    chosen = chosen_dof(dof, system.observed_dof, system.n, names=system.dof_names)
     nu, high = orbit.basis.nu, orbit.basis.harmonics
     multiples = orbit.basis.multiples
     c = np.array([orbit.harmonic(k / nu, chosen) for k in range(high + 1)])
@@ -196,6 +198,7 @@ def motion_dataset(
         "amplitude": orbit.amplitude(chosen),
         "residual": float(orbit.residual),
         "error": float(orbit.truncation),
+        **({"dof_name": system.dof_names[chosen]} if system.dof_names else {}),
     }
     return xarray.Dataset(variables, coords, attributes)
 

@@ -16,6 +16,8 @@ from suboctave.structures.dof_map import DofMap, shown_dofs
 
 #: largest asymmetry of scaled entries
 _ASYMMETRY = 1e-9
+#: asymmetry up to which the digits of a file may be the cause, not a wrong entry
+_ROUNDED = 1e-4
 
 
 def square_matrix(given: Any, what: str, n: int | None = None) -> Any:
@@ -72,12 +74,23 @@ def symmetric_matrix(matrix: Any, what: str, labels: DofMap | None) -> Any:
     if relative[worst] > _ASYMMETRY:
         row, column = sorted((int(i[worst]), int(j[worst])))
         names = f" (DOFs {shown_dofs((row, column), labels)})" if labels is not None else ""
+        apart = abs(float(matrix[row, column] - matrix[column, row]))
         raise InputError(
             f"the {what} is not symmetric: [{row}, {column}] is {matrix[row, column]:g}, [{column}, {row}] is "
-            f"{matrix[column, row]:g}{names}{_half(matrix)}",
+            f"{matrix[column, row]:g}{names}, {apart:.3g} apart; {_rounding(relative[worst]) or _half(matrix)}",
             (what,),
         )
     return ((matrix + matrix.T) * 0.5).tocsr()
+
+
+def _rounding(relative: float) -> str:
+    """What to do about a small asymmetry, relative to the largest entries of row and column."""
+    if relative > _ROUNDED:
+        return ""
+    return (
+        f"that is {relative:.0e} of the largest entries there: if it comes of writing few digits, give the symmetric "
+        "part, 0.5 * (A + A.T)"
+    )
 
 
 def _half(matrix: Any) -> str:
@@ -86,10 +99,10 @@ def _half(matrix: Any) -> str:
     off = (i != j) & (matrix.tocoo().data != 0)
     lower, upper = bool(np.any((i > j) & off)), bool(np.any((i < j) & off))
     if lower and upper:
-        return "; the file or its parts may have been put together wrongly"
+        return "the file or its parts may have been put together wrongly"
     half = "lower" if lower else "upper"
     return (
-        f"; only the {half} triangle has entries: one half of a symmetric matrix was read as all of it. The whole is "
+        f"only the {half} triangle has entries: one half of a symmetric matrix was read as all of it. The whole is "
         "A + A.T - diag(A)"
     )
 

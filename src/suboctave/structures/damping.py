@@ -21,6 +21,15 @@ from suboctave.structures.frequencies import natural_frequencies
 MOST_MODAL = 2000
 
 
+def _check_ratio(ratio: float) -> None:
+    """Refuse a damping ratio from 1 on: with it nothing vibrates, and percentages are meant."""
+    if ratio >= 1:
+        raise InputError(
+            f"a damping ratio of {ratio:g} is {100 * ratio:g} per cent of critical: write {ratio / 100:g} for "
+            f"{ratio:g} per cent; what is damped so much that it does not vibrate needs a damping matrix"
+        )
+
+
 @dataclass(frozen=True)
 class Rayleigh:
     """Damping `alpha M + beta K`. Numbers, or expressions in the parameters of the system.
@@ -45,13 +54,15 @@ class Rayleigh:
     def from_ratios(cls, first: tuple[float, float], second: tuple[float, float]) -> Rayleigh:
         """The damping with given ratios at two circular frequencies: `(omega1, zeta1), (omega2, zeta2)`.
 
-        Between them modes are damped less, beyond them more. Raises `InputError` for frequencies that are the same.
+        Between them modes are damped less, beyond them more. Raises `InputError` for equal frequencies, and for
+        ratios from 1 on (0.02 is 2 per cent of critical).
         """
         for pair in (first, second):
             is_pair = isinstance(pair, Sequence) and len(pair) == 2 and all(map(is_number, pair))
             if not is_pair or not pair[0] > 0 or pair[1] < 0:
                 what = "a pair of a circular frequency above 0 and a damping ratio from 0 on"
                 raise InputError(f"Rayleigh.from_ratios takes twice {what}, not {shortened(pair)}")
+            _check_ratio(pair[1])
         (w1, z1), (w2, z2) = first, second
         if w1 == w2:
             raise InputError(f"Rayleigh.from_ratios needs two different frequencies, not twice {w1:g}")
@@ -83,7 +94,7 @@ class ModalDamping:
 
     ratios
         One number for `count` modes (all modes where none is given), or one number for each of the first modes.
-        Rigid-body modes count, and stay undamped.
+        Each is below 1: 0.02 is 2 per cent of critical. Rigid-body modes count, and stay undamped.
 
     The matrix is full: structures of more than 2000 degrees of freedom are refused, take `Rayleigh` there.
     """
@@ -98,6 +109,7 @@ class ModalDamping:
             object.__setattr__(self, "ratios", given)
         if not given or not all(is_number(ratio) and ratio >= 0 for ratio in given):
             raise InputError(f"damping ratios are numbers from 0 on, not {shortened(self.ratios)}")
+        _check_ratio(max(given))
         if self.count is not None and (several or isinstance(self.count, bool) or self.count < 1):
             raise InputError("count= is for one ratio of several modes, and at least 1")
 

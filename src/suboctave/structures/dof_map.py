@@ -20,11 +20,11 @@ import numpy as np
 
 from suboctave.errors import InputError, shortened, suggest
 from suboctave.model.elements.base import Array
+from suboctave.model.loads import DIRECTIONS
 
 Node: TypeAlias = int | str
 Label: TypeAlias = tuple[Node, str]
 
-DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 #: other names of the directions: numbers, those of Ansys (UX, ROTX), of Nastran (T1, R1)
 _OTHER_NAMES = {
     name: direction
@@ -37,6 +37,8 @@ _OTHER_NAMES = {
         *((f"u{direction}",) if i >= 3 else ()),
     )
 }
+#: texts that name a node, not a DOF
+_NODE = re.compile(r"node[\s_]+\S+|[+-]?\d+", re.IGNORECASE)
 #: names shown of many
 _SHOWN = 6
 
@@ -130,9 +132,31 @@ class DofMap:
         return place
 
     def of_node(self, text: str) -> list[int]:
-        """The degrees of freedom of a node, "node 1042" or "1042"; none where the text is not the name of one."""
+        """The degrees of freedom of a node, "node 1042" or "1042"; none where the text is not the name of one.
+
+        Raises `InputError` for the form "node 1042" or a number where there is no such node.
+        """
         node = node_label(text)
+        if node not in self._nodes and _NODE.fullmatch(text.strip()):
+            raise InputError(self._no_node(node))
         return [self._places[node, direction] for direction in self._nodes.get(node, ())]
+
+    def places(self, given: Any) -> list[int]:
+        """The degrees of freedom that a key of a direction names: one by node and direction, or "1042 z"; by a
+        direction alone, "z", all of that direction.
+
+        Raises `InputError` as `index`, and for directions that there are not.
+        """
+        if isinstance(given, tuple) and len(given) == 2:
+            return [self.index(*given)]
+        text = given.strip() if isinstance(given, str) else ""
+        there = dict.fromkeys(direction for _, direction in self.labels)
+        direction = direction_label(text) if text.isidentifier() else ""
+        if direction in there:
+            return [i for i, label in enumerate(self.labels) if label[1] == direction]
+        if direction in DIRECTIONS:
+            raise InputError(f"no DOF has the direction {direction!r}; there are {', '.join(there)}")
+        return [self.index(given)]
 
     def without(self, dofs: Sequence[int]) -> DofMap:
         """The map of what is left when these degrees of freedom are fixed."""
@@ -148,6 +172,10 @@ class DofMap:
             has = ", ".join(self._nodes[node])
             fixed = ", ".join(sorted(other for which, other in self.fixed if which == node))
             return f"node {node} has no direction {direction!r}; it has {has}" + (f" (fixed: {fixed})" if fixed else "")
+        return self._no_node(node)
+
+    def _no_node(self, node: Node) -> str:
+        """Why there is no such node."""
         if any(which == node for which, _ in self.fixed):
             return f"all DOFs of node {node} are fixed: it moves no more"
         return f"there is no node {node!r}{self._near(node)}"
@@ -178,20 +206,23 @@ def shown_dofs(dofs: Sequence[int], labels: DofMap | None) -> str:
     return ", ".join(names) + (f", ... ({len(dofs)} in all)" if len(dofs) > _SHOWN else "")
 
 
-def weighted(labels: DofMap, weights: Mapping[Any, Any]) -> Array:
-    """The vector (n,) with these weights at `(node, direction)`, or at texts like "1042 z"; zero elsewhere."""
+def weighted(labels: DofMap, weights: Mapping[Any, Any] | str) -> Array:
+    """The vector (n,) with these weights at `(node, direction)`, at texts like "1042 z", or at all DOFs of a direction,
+    "z"; zero elsewhere. A direction alone has the weight 1.
+    """
+    weights = {weights: 1.0} if isinstance(weights, str) else weights
     if not isinstance(weights, Mapping) or not weights:
-        raise InputError(f"a direction is a mapping {{(node, direction): weight}}, not {shortened(weights)}")
+        raise InputError(f"a direction is 'x', or a mapping {{(node, direction): weight}}, not {shortened(weights)}")
     vector = np.zeros(len(labels))
     for key, weight in weights.items():
-        place = labels.index(*key) if isinstance(key, tuple) and len(key) == 2 else labels.index(key)
+        places = labels.places(key)
         try:
             number = float(weight)
         except (TypeError, ValueError):
             number = float("nan")
         if not np.isfinite(number):
             raise InputError(f"the weight of {shortened(key)} must be a finite number, not {shortened(weight)}")
-        vector[place] += number
+        vector[places] += number
     return vector
 
 

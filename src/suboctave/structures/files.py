@@ -11,7 +11,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from suboctave.errors import InputError, located, path_of, shortened, suggest
+from suboctave.errors import InputError, damage, located, path_of, shortened, suggest
 from suboctave.structures import abaqus, calculix, hdf5, matlab, matrix_market, nastran, numpy_files, output2, output4
 from suboctave.structures.contents import Contents, chosen, matrix_of
 from suboctave.structures.dof_map import DofMap, direction_label, node_label
@@ -142,10 +142,9 @@ def _contents(path: Path) -> Contents:
     except InputError:
         raise
     except Exception as error:  # whatever a damaged file makes of its reader
-        reason = " ".join(str(error).split())[:120]
         raise InputError(
             f"{path.name} cannot be read as {what}: it may be cut off, or be of another kind than its ending says "
-            f"({type(error).__name__}: {reason})"
+            f"({damage(error)})"
         ) from None
 
 

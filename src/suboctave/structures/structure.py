@@ -97,8 +97,12 @@ class Structure:
         """
         return self._labels().index(node, direction)
 
-    def direction(self, weights: Mapping[Any, float]) -> Array:
-        """The vector (n,) of a weighted sum of displacements, `{(node, direction): weight}`, for `direction=`."""
+    def direction(self, weights: Mapping[Any, float] | str) -> Array:
+        """The vector (n,) of a weighted sum of displacements, `{(node, direction): weight}`, for `direction=`.
+
+        A direction alone stands for all DOFs in it: `direction("x")` is the translation along x, `{"z": -1.0}` upside
+        down along z.
+        """
         return weighted(self._labels(), weights)
 
     def _labels(self) -> DofMap:
@@ -111,8 +115,8 @@ class Structure:
     def fixed(self, dofs: Iterable[Any]) -> Structure:
         """The structure with some degrees of freedom held: their rows and columns go.
 
-        `dofs`: numbers from 0, pairs (node, direction), texts like "1042 z", or "node 1042" for all of a node. Raises
-        `InputError` for what is none.
+        `dofs`: numbers from 0, pairs (node, direction), texts like "1042 z", "node 1042" for all of a node, or "z" for
+        all in a direction. Raises `InputError` for what is none.
         """
         if isinstance(dofs, str | Integral) or not isinstance(dofs, Iterable):
             raise InputError(f"fixed takes a list of DOFs, not {shortened(dofs)}")
@@ -136,7 +140,7 @@ class Structure:
         if isinstance(item, Sequence) and not isinstance(item, str) and len(item) == 2:
             return [self.dof(*item)]
         of_node = self._labels().of_node(item) if isinstance(item, str) else ()
-        return of_node or [self.dof(item)]
+        return of_node or self._labels().places(item)
 
     # --------------------------------------------------------------------------------------------------------- motion
     def with_damping(self, damping: Any) -> Structure:

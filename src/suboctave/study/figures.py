@@ -68,7 +68,7 @@ class Figure(Section):
 
     kind: str = "response"
     file: str
-    dof: int | None = None
+    dof: int | str | None = None
     frequency: str | None = None
     omega_reference: float | None = None
     scale: float | None = None
@@ -87,8 +87,8 @@ class Figure(Section):
     def check(self, study: StudyCurves) -> Iterator[Complaint]:
         """What is wrong with it, before any work."""
         if study.system is not None:
-            count = study.system.n
-            yield from tried("dof", lambda: chosen_dof(self.dof, 0, count))
+            system = study.system
+            yield from tried("dof", lambda: chosen_dof(self.dof, 0, system.n, names=system.dof_names))
 
     def draw(self, results: Mapping[str, Result], path: Path) -> bool:
         """Draw it; False where what it shows is not there.
@@ -158,7 +158,7 @@ class CurveFigure(Figure):
         planes = {name: getattr(item, "plane", None) for name, item in results.items() if isinstance(item, _CURVES)}
         every = self.drawn(planes)
         there = [name for name in every if name in results and drawable(results[name])]
-        view = self.view
+        view = self.view.placed(results.values())
         given: list[str] | None = getattr(self, "labels", None)
         drawn = [
             curve

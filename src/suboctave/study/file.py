@@ -25,6 +25,7 @@ from suboctave.study.outputs import Outputs, check_outputs
 from suboctave.study.steps import STEPS, CheckContext, Known, Step
 from suboctave.study.sweeps.plan import SweepSection, plan_of
 from suboctave.study.system import SystemSection, make_system, overridden
+from suboctave.units import UnitSystem
 from suboctave.version import __version__
 
 #: a study file is written by hand; anything longer is something else
@@ -126,7 +127,8 @@ def read_study(path: str | Path, allow_code: bool = False) -> Study:
         section = _validated(SystemSection, sections.system, ("system",), mistakes, rest=True)
         system = make_system(section, source.parent, mistakes, allow_code)
         with mistakes.at("system"):
-            system = system and system.with_units(section.units)
+            units = UnitSystem.of(getattr(section, "units", None))  # said also where something else is wrong
+            system = system and system.with_units(str(units) if units else None)
     steps = _steps(getattr(sections, "analyses", []), system, mistakes, allow_code)
     outputs = _outputs(sections.outputs, steps, system, mistakes)
     every = tuple(step for step in steps if step)
@@ -191,6 +193,27 @@ def _validated(model: Any, given: Mapping[str, Any], prefix: Key, mistakes: Mist
     return model.model_construct(**kept)
 
 
+#: stands for a range that is wrong while the rest of an analysis is checked
+_SOME_RANGE = [1.0, 2.0]
+
+
+def _step(kind: type[Step], given: Mapping[str, Any], place: Key, mistakes: Mistakes) -> tuple[Any, set[str | int]]:
+    """An analysis; one with keys that are wrong without these, so that all mistakes are told at once, and these keys.
+    None where it cannot do without them.
+    """
+    try:
+        return kind.model_validate(given), set()
+    except ValidationError as error:
+        mistakes.add_validation(place, error, kind)
+        wrong = {item["loc"][0] for item in error.errors(include_url=False) if item["loc"]}
+    needed = {name for name, key in kind.model_fields.items() if key.is_required()} & wrong
+    ranges = dict.fromkeys(needed, _SOME_RANGE)
+    try:
+        return kind.model_validate({name: v for name, v in given.items() if name not in wrong} | ranges), wrong
+    except ValidationError:
+        return None, wrong
+
+
 def _steps(
     analyses: list[dict[str, Any]], system: System | None, mistakes: Mistakes, allow_code: bool
 ) -> list[Step | None]:
@@ -207,14 +230,16 @@ def _steps(
             mistakes.add((*place, "type"), missing if kind is None else wrong)
             steps.append(None)
         else:
-            step = _validated(STEPS[kind], {"name": kind, **given}, place, mistakes)
+            before_it = len(mistakes)
+            step, wrong_keys = _step(STEPS[kind], {"name": kind, **given}, place, mistakes)
             steps.append(step)
             here = step and system and overridden(system, step.parameters, (*place, "parameters"), mistakes)
             if here is not None:
-                around, before_it = CheckContext(here, before, allow_code, known), len(mistakes)
+                around = CheckContext(here, before, allow_code, known)
                 with mistakes.at(*place):
                     for where, text in step.check(around):
-                        mistakes.add((*place, *where), text)
+                        if not wrong_keys or (where and where[0] not in wrong_keys):
+                            mistakes.add((*place, *where), text)
                     motions = step.known(around)
                     if motions is not None and len(mistakes) == before_it:
                         known[step.name] = motions

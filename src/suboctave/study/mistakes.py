@@ -74,7 +74,7 @@ class Mistakes:
 
     def add_validation(self, prefix: Key, error: pydantic.ValidationError, model: type[pydantic.BaseModel]) -> None:
         """What pydantic found in the table at `prefix`, which is a `model`, in our words."""
-        for item in error.errors(include_url=False):
+        for item in _of_nearest_reading(error.errors(include_url=False), prefix, self.lines):
             path = _shortened((*prefix, *item["loc"]), self.lines, item["type"] == "missing")
             self.add(path, _in_words(item, _keys(model, item["loc"])))
 
@@ -97,6 +97,34 @@ def written(path: Key) -> str:
     for part in path:
         text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else str(part)
     return text
+
+
+def _of_nearest_reading(errors: Sequence[Any], prefix: Key, lines: Lines) -> list[Any]:
+    """What pydantic found, of a value that may be one of several things only what is wrong with it as the one that it
+    is nearest to: of which fewest parts are of the wrong type.
+    """
+    readings: dict[Key, dict[str, list[Any]]] = {}
+    for item in errors:
+        place = item["loc"][:-1] if item["type"] == "missing" else item["loc"]
+        # names that pydantic gives to alternatives are no keys of the file
+        depth = next((i for i in range(1, len(place)) if _names_reading(place, i, prefix, lines)), len(place))
+        name = str(place[depth]) if depth < len(place) else ""
+        readings.setdefault(tuple(place[:depth]), {}).setdefault(name, []).append(item)
+    kept: list[Any] = []
+    for alternatives in readings.values():
+        plain = alternatives.pop("", [])
+        nearest = min(alternatives.values(), key=_misfit, default=[])
+        kept += plain + nearest
+    return kept
+
+
+def _names_reading(place: Sequence[str | int], i: int, prefix: Key, lines: Lines) -> bool:
+    return isinstance(place[i], str) and (*prefix, *place[: i + 1]) not in lines
+
+
+def _misfit(errors: Sequence[Any]) -> tuple[int, int]:
+    """How many parts are of the wrong type, and how many are wrong."""
+    return sum(item["type"].endswith("_type") for item in errors), len(errors)
 
 
 def _shortened(path: Key, lines: Lines, missing: bool) -> Key:

@@ -143,7 +143,7 @@ class DofNames:
         if isinstance(placed.get("inputs"), Mapping):
             with located("inputs"):
                 placed["inputs"] = {name: self._numbered(place) for name, place in placed["inputs"].items()}
-        if isinstance(placed.get("direction"), Mapping):
+        if isinstance(placed.get("direction"), Mapping | str):
             with located("direction"):
                 placed["direction"] = self._direction(placed["direction"])
         return placed
@@ -161,9 +161,11 @@ class DofNames:
             raise InputError(f"there is no DOF {name!r}{hint}")
         return list(self.names).index(name)
 
-    def _direction(self, weights: Mapping[str, Any]) -> Any:
+    def _direction(self, weights: Mapping[str, Any] | str) -> Any:
         if self.structure is not None:
             return self.structure.direction(weights)
+        if isinstance(weights, str):
+            raise InputError(f"direction = {weights!r}: without a structure give a number for each DOF")
         vector = [0.0] * len(self.names)
         for name, weight in weights.items():
             vector[self._number(name)] = weight

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -14,9 +15,10 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from suboctave.errors import InputError, Key, suggest
+from suboctave.errors import InputError, Key, damage, suggest
 from suboctave.model import library
 from suboctave.model.description import build_part
+from suboctave.model.loads import StaticLoad
 from suboctave.model.matrices import matrix_coefficient
 from suboctave.model.system import System
 from suboctave.structures.structure import Structure
@@ -102,6 +104,13 @@ def make_system(section: SystemSection, folder: Path, mistakes: Mistakes, allow_
                 mistakes.add((*placed[first][int(rest[0])][0], *rest[1:]), str(part))
             elif complete or first != "parameters":  # a part that could not be read may use the parameter
                 mistakes.add(("system", *part.key), str(part))
+        idle = {str(part.key[1]) for part in error.parts if part.key[:1] == ("parameters",) and len(part.key) == 2}
+        if not complete or len(idle) < len(error.parts):
+            return None
+        # parameters that nothing uses leave a system by which the rest of the file is checked: a load of zero uses them
+        with suppress(InputError):
+            loads = [*loads, StaticLoad(0, f"0*({' + '.join(sorted(idle))})")]
+            return System(mass, damping, stiffness, elements, loads, section.parameters, title, dof_names, losses)
         return None
     return system if complete else None
 
@@ -250,7 +259,7 @@ def read_matrix(path: Path, key: str | None) -> Any:
     except InputError:
         raise
     except Exception as error:  # whatever a damaged file makes of its reader
-        raise InputError(f"cannot read {path}: {type(error).__name__}: {str(error)[:120]}") from None
+        raise InputError(f"cannot read {path}: {damage(error)}") from None
     if not hasattr(matrix, "tocsr"):
         matrix = np.asarray(matrix)
         if matrix.dtype.kind not in "fiu":

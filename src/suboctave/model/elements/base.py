@@ -18,7 +18,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from suboctave.errors import InputError, located
+from suboctave.errors import InputError, located, shortened
 from suboctave.model.description import Recorded
 from suboctave.model.elements.batch_form import BatchForm, CalledBack, form_of_sampling
 from suboctave.model.elements.smoothness import Sampling, WholeLaw, widths_of
@@ -48,7 +48,9 @@ class Place:
         if dof is None:
             self.vector = numbers_of(direction)
             if self.vector.ndim != 1 or not np.all(np.isfinite(self.vector)) or not np.any(self.vector):
-                text = f"{owner}: direction must be a vector of finite numbers, not all zero"
+                named = isinstance(direction, str | Mapping)
+                hint = f"; a structure makes it: structure.direction({shortened(direction)})" if named else ""
+                text = f"{owner}: direction must be a vector of finite numbers, not all zero{hint}"
                 raise InputError(text, ("direction",))
             self.vector.setflags(write=False)
             return

@@ -22,7 +22,7 @@ from suboctave.curves.events.formulation import FORMULATIONS, formulation_of
 from suboctave.errors import InputError, Key, suggest
 from suboctave.floquet.methods import METHODS, Arbitration, method_of
 from suboctave.harmonic.truncation import AdaptiveHarmonics
-from suboctave.kinds import KINDS
+from suboctave.kinds import KINDS, suggest_kind
 from suboctave.maps.isolas.result import Isola, Isolas
 from suboctave.model.inputs import check_bounds, check_parameter, start_state
 from suboctave.model.system import System
@@ -366,7 +366,7 @@ class Motion(Curve):
         if sum(way is not None for way in (self.point, self.bifurcation, self.nearest)) > 1:
             yield place, "choose by point, by bifurcation or by nearest, not by several of them"
         if self.bifurcation is not None and self.bifurcation not in KINDS:
-            kinds = suggest(self.bifurcation, KINDS)
+            kinds = suggest_kind(self.bifurcation)
             yield (*place, "bifurcation"), f"there is no kind of bifurcation {self.bifurcation!r}{kinds}"
         known = ["omega", "amplitude", *system.parameters]
         for name in self.nearest or {}:

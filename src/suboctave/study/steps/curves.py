@@ -328,7 +328,7 @@ class Track(CurveStep, kind="track", verb=track):
         kind = None if self.motion is None else self.motion.bifurcation
         if kind is None:
             yield ("start",), 'name a bifurcation: start = { analysis = "response", bifurcation = "PD" }'
-        elif kind not in (*TRACKED_KINDS, *_EXTREMA, *CURVES_THROUGH):
+        elif kind in KINDS and kind not in (*TRACKED_KINDS, *_EXTREMA, *CURVES_THROUGH):
             known = suggest(kind, (*TRACKED_KINDS, *CURVES_THROUGH))
             yield ("start", "bifurcation"), f"{kind} cannot be tracked{known}"
         elif kind in _EXTREMA and not isinstance(self.parameter, str):
