@@ -146,3 +146,17 @@ def test_the_lowest_peak_over_the_damping_of_an_absorber():
     assert "minimum of amplitude" in repr(ridge)
     with pytest.raises(so.InputError):
         so.track(lowest[0], "zeta", (0.1, 0.2))
+
+
+def test_a_ridge_goes_on_through_an_isola_down_to_its_valley():
+    """The peaks come off the response where the isola merges with it, and end where it is born: there the ridge turns."""
+    response = so.frequency_response(so.library.nltva(F=0.19), (0.8, 6.0))
+    ridge = so.track_peak(response, "F", (0.10, 0.25))
+    assert ridge.ended.count("reached the end of the range") == 2
+    assert ridge.warnings == ()
+    turns = {item.extreme: item for item in ridge.extrema if item.parameter_name == "F"}
+    isolas = so.find_isolas(so.library.nltva(F=0.19), (0.8, 6.0), "F", (0.1, 0.25), values=3, levels=(), search=())
+    (isola,) = isolas
+    for extreme, end in (("minimum", isola.born), ("maximum", isola.merges)):
+        assert turns[extreme].omega == pytest.approx(end.omega, abs=1e-7)
+        assert turns[extreme].parameter("F") == pytest.approx(float(end), abs=1e-8)

@@ -171,18 +171,30 @@ class TurningPoint(Extremum):
 
 @dataclass(frozen=True)
 class PeakTurns(CurveTest):
-    """The peaks that a ridge consists of are highest or lowest over its last parameter. Where that turns, a peak and a
-    valley meet, and the amplitude turns with it: no extremum over the parameter.
+    """The peaks that a ridge consists of are highest or lowest over its last parameter. Where that turns, either a peak
+    and a valley meet, and the amplitude turns with it, or a closed response has its peak and its valley in one point:
+    neither is an extremum over the parameter.
     """
 
     name: str = "amplitude"
     kind = "extremum"
 
-    def value(self, sample: Sample) -> float:
-        equations = sample.evaluation.equations.own
+    @staticmethod
+    def _rates(sample: Sample) -> tuple[float, float]:
+        """Of the amplitude, relative to it, and of the parameter, in units of its range, along the curve."""
+        equations, name = sample.evaluation.equations.own, sample.curve.name
         assert isinstance(equations, RidgeEquations)
-        slope = sample.slopes[sample.curve.name]
-        return equations.rate(sample.point.tangent) / slope if slope != 0.0 else math.nan
+        weight = float(sample.point.weights[sample.curve.index(name)])
+        return equations.rate(sample.point.tangent), weight * sample.slopes[name]
+
+    def value(self, sample: Sample) -> float:
+        rate, slope = self._rates(sample)
+        size = rate * rate + slope * slope
+        return rate * slope / size if size > 0.0 else math.nan
+
+    def genuine(self, sample: Sample) -> bool:
+        rate, slope = self._rates(sample)
+        return abs(rate) < abs(slope)
 
     def extreme(self, before: float, at: Sample) -> str:
         return "maximum" if before * at.slopes[at.curve.name] > 0.0 else "minimum"
