@@ -149,7 +149,7 @@ def test_the_lowest_peak_over_the_damping_of_an_absorber():
 
 
 def test_a_ridge_goes_on_through_an_isola_down_to_its_valley():
-    """The peaks come off the response where the isola merges with it, and end where it is born: there the ridge turns."""
+    """Peaks come off the response where the isola merges with it, and end where it is born: there the ridge turns."""
     response = so.frequency_response(so.library.nltva(F=0.19), (0.8, 6.0))
     ridge = so.track_peak(response, "F", (0.10, 0.25))
     assert ridge.ended.count("reached the end of the range") == 2

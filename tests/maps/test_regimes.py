@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import copy
+
 import numpy as np
 import pytest
 
 import suboctave as so
 from suboctave.analysis.diagram import Followed, grown_from
+from suboctave.interruption import Interruption
 from suboctave.maps.catalogue import Catalogue, SearchRange, carrier_of
 from suboctave.maps.regimes.arcs import Arc, Edge, Slice, Strip
 from suboctave.maps.regimes.map import RegimeMap
@@ -114,6 +117,14 @@ def test_a_period_doubling_and_what_only_time_integration_knows(doubling, tmp_pa
     assert all(one.period in (3, 5) for one in checked.disagreements)
     doubling.plot(tmp_path / "map.png")
     assert (tmp_path / "map.png").stat().st_size > 10_000
+
+
+def test_a_map_that_is_not_complete_says_so_in_its_picture(doubling):
+    stopped = copy.copy(doubling)
+    stopped.interruption = Interruption()
+    for item, first in ((doubling, "T"), (stopped, f"incomplete: {Interruption()}")):
+        (legend,) = item.plot().legends
+        assert legend.get_texts()[0].get_text() == first
 
 
 @pytest.mark.slow

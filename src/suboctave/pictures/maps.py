@@ -44,6 +44,7 @@ def plot_regimes(
     curves: bool = True,
     labels: Sequence[str] | None = None,
     smallest: float = 5e-4,
+    missing: str = "",
     xlabel: str | None = None,
     ylabel: str | None = None,
 ) -> Layout:
@@ -63,6 +64,8 @@ def plot_regimes(
         What the legend calls the regimes, in their order.
     smallest
         Regimes with a smaller share of the plane are counted in the legend, not named.
+    missing
+        Why the map is not complete, the first line of the legend.
     """
     check_count("labels", labels, len(regimes), "regimes")
     colours = _colours(regimes)
@@ -72,6 +75,8 @@ def plot_regimes(
     dotted = isolated[cells] if len(regimes) else np.zeros(cells.shape, dtype=bool)
 
     frame = Frame([Raster(image, across, upwards, {DOTS: dotted}, layer=0.0)])
+    if missing:
+        frame.entries[missing] = Entry()
     for number in sorted(range(len(regimes)), key=lambda i: (_rank(regimes[i]), isolated[i])):
         if np.count_nonzero(cells == number) > smallest * cells.size:
             hatch = DOTS if isolated[number] else ""

@@ -271,7 +271,8 @@ class RegimeMap(PlaneMap):
         lines = list(self._lines())
         units = self.system.units
         plane = (self.omega, self.bounds), (f"omega ({units.frequency})" if units else "omega", self.parameter)
-        return plot_regimes(cells, labels, lines, *plane, path=path, **options)
+        missing = "" if self.interruption is None else f"incomplete: {self.interruption}"
+        return plot_regimes(cells, labels, lines, *plane, missing=missing, path=path, **options)
 
     def _lines(self) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
         """The stretches of borders that stable motions end at, in the strips in which they do: kind, omega, values."""
