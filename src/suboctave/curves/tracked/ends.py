@@ -28,6 +28,7 @@ import numpy as np
 
 from suboctave.bifurcation.bifurcation import TrackedEvent
 from suboctave.continuation import CurvePoint, NewtonOptions
+from suboctave.continuation.events import Bracket
 from suboctave.continuation.linear import length
 from suboctave.continuation.point import point_ahead
 from suboctave.continuation.problem import Array
@@ -40,7 +41,7 @@ from suboctave.curves.kinds.limit_cycle import LimitCycle, oscillating
 from suboctave.curves.kinds.singular import SingularOperator
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.sample import Sample
-from suboctave.curves.tracked.events import LocatedEvent, located, nearest_point, zero_along
+from suboctave.curves.tracked.events import LocatedEvent, nearest_point, same_discretisation, zero_along
 from suboctave.curves.tracked.tests import CurvesCross, CurveTest, DoubleMultiplier, GeneralisedDoubling
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.evaluation import BalanceState
@@ -166,7 +167,7 @@ def _in_its_parent(a: Sample, b: Sample, newton: NewtonOptions) -> End:
             "half the period"
         )
         with suppress(ConvergenceError):
-            return End(reason, located(CurvesCross(), a, b, newton), last=True)
+            return End(reason, _tip(a, b, newton), last=True)
         return End(reason)
     if a.curve.augmentation.turning:
         return End(f"the oscillation vanishes between {a.where} and {b.where}: in a generalised Hopf (Bautin) point")
@@ -180,6 +181,20 @@ def _in_its_parent(a: Sample, b: Sample, newton: NewtonOptions) -> End:
         return End(f"the oscillation vanishes between {a.where} and {b.where} ({failure})")
     where = f"omega = {hopf.omega:.6g}, {hopf.parameter_name} = {hopf.parameter(hopf.parameter_name):.6g}"
     return End(f"the oscillation vanishes in a Hopf point at {where}", hopf=hopf, behind=share * (b.place - a.place))
+
+
+def _tip(a: Sample, b: Sample, newton: NewtonOptions) -> LocatedEvent:
+    """The BP at which odd harmonics vanish: where they do, as the orientation may change for others besides, and of a
+    tongue of high order as good as not; raises ConvergenceError.
+    """
+    start = same_discretisation(a, b, newton)
+    odd = _oscillation(start)[1]
+
+    def left(point: CurvePoint) -> float:
+        return float(np.vdot(odd, _oscillation(Sample(point))[1]))
+
+    bracket = Bracket(start.point, b.point, (left(start.point), left(b.point)), left, newton)
+    return LocatedEvent(CurvesCross(), Sample(bracket.points[bracket.zero()]), ends=(start, b))
 
 
 def resonant_between(a: Sample, b: Sample) -> float | None:
