@@ -17,7 +17,7 @@ with `eta.a = sum_s eta_s a_s`.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -29,7 +29,6 @@ from suboctave.harmonic.quadrature import (
     FEWEST,
     GAUSS,
     MOST,
-    SETTLED,
     Nodes,
     between_corners,
     graded_nodes,
@@ -328,7 +327,7 @@ class GeneralLaw(LawAlong):
                     parts.append(_finite_part(self, corner))
         return parts
 
-    def settled_samples(self, member: Member) -> int | None:
+    def settled_samples(self, member: Member, settled: Callable[[ComplexArray, ComplexArray], bool]) -> int | None:
         """See `LawAlong.settled_samples`.
 
         Raises
@@ -344,7 +343,7 @@ class GeneralLaw(LawAlong):
         while count <= MOST:
             current = np.zeros((1 + along.size, along.top + 1), dtype=complex)
             GeneralLaw(along, [member._replace(samples=count)]).add_spectra(current)
-            if previous is not None and _relative_change(previous, current) < SETTLED:
+            if previous is not None and settled(previous, current):
                 return count // 2
             previous, count = current, 2 * count
         raise ConvergenceError(
@@ -353,12 +352,6 @@ class GeneralLaw(LawAlong):
             "widths) or CornerSampling), write it as a text (Expression), whose corners are located, or use an exact "
             "piecewise-linear element"
         )
-
-
-def _relative_change(a: ComplexArray, b: ComplexArray) -> float:
-    """Largest change of a row of spectra in units of its largest coefficient."""
-    size = np.maximum(np.abs(b).max(axis=1), np.finfo(float).tiny)
-    return float((np.abs(b - a).max(axis=1) / size).max())
 
 
 def _finite_part(law: GeneralLaw, corner: Corner) -> Third:
