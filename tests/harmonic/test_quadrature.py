@@ -209,6 +209,33 @@ def test_a_contact_that_is_not_reached_needs_no_more_samples_than_what_matters()
         np.testing.assert_allclose(end, start, atol=1e-6 * np.abs(start).max())
 
 
+@pytest.mark.parametrize("steepness", [1.0, 50.0, 1e4])
+@pytest.mark.parametrize(
+    ("text", "law"),
+    [
+        ("0.2*tanh({}*v)", lambda x, v, s: 0.2 * np.tanh(s * v)),
+        ("(1+x**2)*atan({}*(v-0.3))*v", lambda x, v, s: (1.0 + x**2) * np.arctan(s * (v - 0.3)) * v),
+    ],
+)
+def test_steep_texts_in_a_velocity_against_a_million_samples(text, law, steepness):
+    """The trapezoidal rule converges like exp(-2 pi d / step), d = 1e-4 the width of the steepest step in time."""
+    c, top, count = motion_of("rough"), 17, 1 << 20
+    spectrum = channel_of(so.Expression(0, text.format(steepness)), c, top).spectra[0]
+    tau = 2.0 * np.pi * np.arange(count) / count
+    exact = np.fft.rfft(law(value(c, tau), value(1j * np.arange(len(c)) * c, tau), steepness))[: top + 1] / count
+    np.testing.assert_allclose(spectrum, exact, atol=1e-11 * np.abs(exact).max())
+
+
+def test_steep_friction_as_a_text_is_that_of_the_element():
+    tops = []
+    for friction in (so.Expression(0, "0.2*tanh(500*v)"), so.TanhFriction(0, 0.2, 1.0 / 500.0)):
+        system = System(1.0, 0.02, 1.0, elements=[friction], loads=[HarmonicLoad(0, 0.5)])
+        curve = so.frequency_response(system, (0.8, 1.1))
+        assert curve.omega[-1] == pytest.approx(1.1)
+        tops.append(curve.amplitude.max())
+    assert tops[0] == pytest.approx(tops[1], rel=1e-9)
+
+
 def test_samples_of_slopes_settle_by_what_they_do_to_multipliers():
     """A light mass behind a sharp law that hardly moves: its multipliers are those of the law that is told."""
     told, blind = (kind(1, 1e-4, 1e-5, side="right", regularization=1e6) for kind in (ElasticStop, Silent))

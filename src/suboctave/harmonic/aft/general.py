@@ -117,7 +117,7 @@ class GeneralLaw(LawAlong):
         if isinstance(kind, CornerSampling):
             return Smoothness(kind.points, kind.velocities, kind.rough, cornered=True)
         if isinstance(kind, SharpVelocitySampling):
-            return Smoothness(sharp_velocities=(kind.velocities, kind.widths), sharp=True)
+            return Smoothness(sharp_velocities=(kind.velocities, kind.widths), sharp=True, degree=1 + kind.degree)
         if isinstance(kind, PolynomialSampling):
             return Smoothness(degree=self._degree)
         return Smoothness(sharp=isinstance(kind, SharpSampling), unknown=isinstance(kind, AdaptiveSampling))
@@ -143,9 +143,10 @@ class GeneralLaw(LawAlong):
         if isinstance(kind, PolynomialSampling):
             return polynomial_nodes(self._degree * along.high + varying, along.top)
         if isinstance(kind, SharpVelocitySampling):
+            highest = along.top + kind.degree * along.high
             if not self._velocity.any():
-                return polynomial_nodes(along.top + 1, along.top)
-            return graded_nodes(self._velocity, np.array(kind.velocities), np.array(kind.widths), along.top)
+                return polynomial_nodes(highest + 1, along.top)
+            return graded_nodes(self._velocity, np.array(kind.velocities), np.array(kind.widths), highest)
         if isinstance(kind, SharpSampling):
             sharp = [m.kind for m in self.members if isinstance(m.kind, SharpSampling)]
             points, widths = (
@@ -348,9 +349,10 @@ class GeneralLaw(LawAlong):
             previous, count = current, 2 * count
         raise ConvergenceError(
             f"{member.element.label}: the force does not settle with {MOST} samples per period: it is too sharp to be "
-            "sampled blindly. Tell where its law is sharp or has corners (sampling returning SharpSampling(points, "
-            "widths) or CornerSampling), write it as a text (Expression), whose corners are located, or use an exact "
-            "piecewise-linear element"
+            "sampled blindly. Of a text (Expression) places are known where it has corners (abs, max, ...), or is "
+            "sharp as tanh or atan of one velocity times a polynomial; a class of your own can tell them (sampling "
+            "returning SharpSampling(points, widths) or CornerSampling). Elements that are exact: ElasticStop, "
+            "Freeplay, TanhFriction"
         )
 
 
