@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from channels import by_coefficients, channel_of
-from scipy.integrate import quad
+from scipy.integrate import quad, solve_ivp
 from slow import slow
 
 import suboctave as so
@@ -144,9 +144,13 @@ class Silent(ElasticStop):
         return AdaptiveSampling()
 
 
+def same(one, other):
+    return np.abs(other - one).max() <= 1e-11 * np.abs(other).max()
+
+
 def samples_for(element, c):
     (law,) = channel_of(element, c, 17).laws
-    return law.settled_samples(law.members[0])
+    return law.settled_samples(law.members[0], same)
 
 
 class Broken(CubicSpring):
@@ -181,6 +185,67 @@ def test_a_law_too_sharp_to_be_sampled_blindly_is_refused(element):
     x[1] = 1.7
     with pytest.raises(ConvergenceError, match=r"dof=0.*does not settle.*SharpSampling"):
         balance.settle(x, 1.0)
+
+
+def test_a_contact_that_is_not_reached_needs_no_more_samples_than_what_matters():
+    """A smooth contact far from its gap is the rounding of log(1 + e), 1e-12 of the other forces. The response through
+    the resonance and past it, where the oscillator is linear, against integration over a period with another form of
+    the law.
+    """
+    law = "x''+0.1*x'+x+20*log(1+exp(30*(x-1)))/30=F*cos(omega*t)"
+    system = so.System.from_equations([law], {"F": 0.8})
+    curve = so.frequency_response(system, (3.0, 1.1), harmonics=140)
+    assert curve.omega[-1] == pytest.approx(1.1)
+    assert curve.amplitude[0] == pytest.approx(0.8 / abs(1.0 - 9.0 + 0.3j), abs=1e-10)
+    assert curve.amplitude.max() > 5.0
+    for i in np.linspace(0, len(curve) - 1, 6).astype(int):
+        start, omega = curve.orbits[i].start(), curve.omega[i]
+
+        def rate(t, y, omega=omega):
+            contact = 20.0 * np.logaddexp(0.0, 30.0 * (y[0] - 1.0)) / 30.0
+            return y[1], 0.8 * np.cos(omega * t) - 0.1 * y[1] - y[0] - contact
+
+        end = solve_ivp(rate, (0.0, 2.0 * np.pi / omega), start, "DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+        np.testing.assert_allclose(end, start, atol=1e-6 * np.abs(start).max())
+
+
+@pytest.mark.parametrize("steepness", [1.0, 50.0, 1e4])
+@pytest.mark.parametrize(
+    ("text", "law"),
+    [
+        ("0.2*tanh({}*v)", lambda x, v, s: 0.2 * np.tanh(s * v)),
+        ("(1+x**2)*atan({}*(v-0.3))*v", lambda x, v, s: (1.0 + x**2) * np.arctan(s * (v - 0.3)) * v),
+    ],
+)
+def test_steep_texts_in_a_velocity_against_a_million_samples(text, law, steepness):
+    """The trapezoidal rule converges like exp(-2 pi d / step), d = 1e-4 the width of the steepest step in time."""
+    c, top, count = motion_of("rough"), 17, 1 << 20
+    spectrum = channel_of(so.Expression(0, text.format(steepness)), c, top).spectra[0]
+    tau = 2.0 * np.pi * np.arange(count) / count
+    exact = np.fft.rfft(law(value(c, tau), value(1j * np.arange(len(c)) * c, tau), steepness))[: top + 1] / count
+    np.testing.assert_allclose(spectrum, exact, atol=1e-11 * np.abs(exact).max())
+
+
+def test_steep_friction_as_a_text_is_that_of_the_element():
+    tops = []
+    for friction in (so.Expression(0, "0.2*tanh(500*v)"), so.TanhFriction(0, 0.2, 1.0 / 500.0)):
+        system = System(1.0, 0.02, 1.0, elements=[friction], loads=[HarmonicLoad(0, 0.5)])
+        curve = so.frequency_response(system, (0.8, 1.1))
+        assert curve.omega[-1] == pytest.approx(1.1)
+        tops.append(curve.amplitude.max())
+    assert tops[0] == pytest.approx(tops[1], rel=1e-9)
+
+
+def test_samples_of_slopes_settle_by_what_they_do_to_multipliers():
+    """A light mass behind a sharp law that hardly moves: its multipliers are those of the law that is told."""
+    told, blind = (kind(1, 1e-4, 1e-5, side="right", regularization=1e6) for kind in (ElasticStop, Silent))
+    x = np.zeros((11, 2))
+    x[1] = 1.0, 2e-5
+    tangents = []
+    for element in (told, blind):
+        system = System(np.diag([1.0, 1e-4]), np.diag([0.1, 1e-5]), np.eye(2), [element], [HarmonicLoad(0, 1.0)])
+        tangents.append(HarmonicBalance(system, HarmonicBasis(5)).settle(x, 1.0).at(x, 1.0).tangent_spectra)
+    np.testing.assert_allclose(tangents[1], tangents[0], atol=1e-10 * 1e-4)
 
 
 def test_samples_stay_frozen_until_settled_again(damper):

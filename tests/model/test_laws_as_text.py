@@ -10,7 +10,7 @@ import pytest
 
 import suboctave as so
 from suboctave.errors import InputError
-from suboctave.model import AdaptiveSampling, CornerSampling, PolynomialSampling
+from suboctave.model import AdaptiveSampling, CornerSampling, PolynomialSampling, SharpVelocitySampling
 
 VALUES = {"a": 0.5, "b": -0.3, "k": 2.0, "j": 0.2, "c": 0.4, "e": 0.3, "p": 0.7, "v0": 0.6}
 CASES = [
@@ -30,6 +30,11 @@ CASES = [
         AdaptiveSampling,
     ),
     ("exp(e*cos(omega*t))*x", None, AdaptiveSampling),
+    ("k*tanh(v/v0) + a*x**3 + c*v", None, SharpVelocitySampling),
+    ("(k + a*w**2)*atan((u' - j)/v0)", {"w": 1, "u": [1.0, -2.0, 0.0]}, SharpVelocitySampling),
+    ("k/(2 + tanh(v/v0))", None, AdaptiveSampling),
+    ("k*tanh(v/v0)*cos(omega*t)", None, AdaptiveSampling),
+    ("k*tanh(v/v0) + a*atan(x)", None, AdaptiveSampling),
     ("k*x*y**2*sin(omega*t) + c*y'*x", {"x": 0, "y": (1, 2)}, PolynomialSampling),
     ("k*abs(u)*w + b*w'**3", {"w": 1, "u": [1.0, -2.0, 0.0]}, CornerSampling),
     ("k*abs(u)*max(w, 0)", {"w": 1, "u": [1.0, -2.0, 0.0]}, AdaptiveSampling),

@@ -45,7 +45,7 @@ def test_motions_agree(stop):
         assert "120 degrees of freedom in" in repr(check)
 
 
-def test_a_smooth_law_is_stepped(spring):
+def test_a_smooth_law(spring):
     check = so.verify(max(spring.points, key=lambda p: p.orbit.amplitude(TIP)))
     assert check.agrees
     assert check.distance < 1e-5
@@ -67,22 +67,43 @@ def test_a_branch(stop, tmp_path):
     assert repr(again) == repr(check)
 
 
-def test_the_closed_form_is_what_stepping_gives(stop, monkeypatch):
-    """State, tangent flow, slope by omega and contact instants."""
-    orbit = max(stop.orbits, key=lambda o: o.amplitude(TIP))
+@pytest.mark.parametrize(
+    "more",
+    [
+        [],
+        [so.CubicSpring(TIP, 0.3)],
+        [so.TanhFriction(TIP, 0.005, 0.02), so.CubicSpring((TIP, TIP - 5), 30.0)],
+        [so.Expression(TIP, "0.1*x*y**2", inputs={"x": TIP, "y": 60})],
+    ],
+    ids=["stop alone", "spring", "friction and spring", "two inputs"],
+)
+def test_the_closed_form_is_what_stepping_gives(more, monkeypatch):
+    """State, tangent flow, slope by omega and contact instants; with laws that are smooth by collocation."""
+    curve = so.frequency_response(chain([so.ElasticStop(TIP, 1.0, 0.1), *more]), (1.2, 1.1), harmonics=9)
+    orbit = max(curve.orbits, key=lambda o: o.amplitude(TIP))
     small = system_of_motions([orbit])
     start, found = small.reduced(orbit.start()), []
-    for few in (1, 1000):
-        monkeypatch.setattr(field, "FEW", few)
+    for closed in (True, False):
+        monkeypatch.setattr(field.Field, "closed", closed)
         model = scaled_field(small, start, orbit.omega)
-        assert model.closed == (few == 1)
         found.append(flow(model, 0.0, start / model.scale, 2.0 * np.pi, 1e-12, slope=True))
     (one, slopes, passage), (other, stepped, whole) = found
     np.testing.assert_allclose(one, other, atol=1e-9)
     np.testing.assert_allclose(slopes, stepped, atol=1e-8 * np.abs(stepped).max())
-    assert len(passage.contacts) == len(whole.contacts) == 2
+    assert len(passage.contacts) == len(whole.contacts) >= 2
     for contact, seen in zip(passage.contacts, whole.contacts, strict=True):
         assert contact.time == pytest.approx(seen.time, abs=1e-9)
+
+
+def test_trajectories_are_read_between_their_steps(monkeypatch):
+    """Dense output with a smooth law, against steps."""
+    system = chain([so.ElasticStop(TIP, 1.0, 0.1), so.CubicSpring(TIP, 0.3)])
+    orbit = so.frequency_response(system, (1.2, 1.15), harmonics=9).orbits[0]
+    small, times, found = system_of_motions([orbit]), np.linspace(0.0, 7.0, 40), []
+    for closed in (True, False):
+        monkeypatch.setattr(field.Field, "closed", closed)
+        found.append(integrate(small, small.reduced(orbit.start()), times, orbit.omega))
+    np.testing.assert_allclose(found[0].x, found[1].x, atol=1e-9 * np.abs(found[1].x).max())
 
 
 def test_a_body_that_nothing_holds_between_its_contacts(monkeypatch):

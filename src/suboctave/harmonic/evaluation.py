@@ -10,6 +10,7 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Mapping
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -31,7 +32,7 @@ from suboctave.harmonic.assembly import (
 from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis, spectrum_to_real, to_complex
 from suboctave.harmonic.equations import Equations, Laws
 from suboctave.harmonic.linear_part import LinearPart
-from suboctave.harmonic.quadrature import Nodes
+from suboctave.harmonic.quadrature import SETTLED, Nodes
 from suboctave.lazy import lazy
 
 __all__ = ["BalanceState", "HarmonicBalance", "length"]
@@ -91,7 +92,7 @@ class HarmonicBalance(Equations):
         samples: list[int | None] = [None] * len(self.samples)
         for channel in state.channels:
             for law, member in channel.members():
-                samples[member.number] = law.settled_samples(member)
+                samples[member.number] = law.settled_samples(member, partial(state.same_law, channel))
         return self.with_samples(tuple(samples))
 
 
@@ -261,6 +262,22 @@ class BalanceState:
         balance_residual(self.x, self.blocks, self._spectra[0], self.load, balance.directions, weight, parts, sizes)
         size, *forces = sizes.tolist()
         return Balanced(parts[1], parts[2], size, sum(forces))
+
+    def same_law(self, channel: Channel, one: ComplexArray, other: ComplexArray) -> bool:
+        """Whether two spectra of a law's force and slopes (1 + Q, top + 1) differ by what matters nowhere.
+
+        Forces serve the residual, which is held against the forces that balance. Slopes serve Newton's method and the
+        multipliers: over a period these change by `delta f_u / (m rate^2)` and `delta f_v / (m rate)`, m the mass that
+        the direction shows. No law is known better than to its own rounding. A law that hardly acts may so be rounding
+        itself.
+        """
+        weight = self.balance.scales()[1]
+        out, ins = length(weight * channel.out), np.linalg.norm(weight * channel.ins, axis=1)
+        rates = [self.rate**2, self.rate][: 1 + channel.moving]
+        weights = np.append(out, np.tile(out * ins, len(rates)))
+        matters = np.append(self.balanced.scale, np.repeat(rates, len(ins)))
+        change, size = np.abs(other - one).max(axis=1), np.abs(other).max(axis=1)
+        return bool(np.all(weights * change <= SETTLED * (weights * size + matters)))
 
     @property
     def driven(self) -> bool:

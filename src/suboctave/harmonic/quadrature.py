@@ -30,7 +30,7 @@ from suboctave.harmonic.trigonometric import FAST, displacement, extrema, jet
 
 #: fewest and most uniform samples per period of laws of unknown smoothness
 FEWEST, MOST = 32, 1 << 15
-#: relative change of force and tangent coefficients below which their number has settled
+#: change of force and tangent coefficients below which their number has settled, in units of what matters
 SETTLED = 1e-11
 #: nodes of the Gauss-Legendre rules in the tables, from 0 to this
 ORDERS = 64

@@ -30,7 +30,7 @@ __all__ = ["Array", "Field", "Switch", "default_lengths", "scaled_field"]
 Array = NDArray[np.float64]
 RightHandSide = Callable[[float, Array], Array]
 
-#: degrees of freedom up to which everything is stepped
+#: degrees of freedom up to which a system that is no projected structure is stepped
 FEW = 40
 # A degree of freedom that hardly moves is measured against this share of the largest motion (weighted by its mass).
 _SMALLEST_SHARE = 1e-3
@@ -127,7 +127,7 @@ class Field:
         push = self.loads.direction @ velocity_per_force.T
         self._push = np.hstack([np.zeros_like(push), push])
         #: of every law: its tangent, its coefficients, which of the columns read are its own
-        self._laws: list[tuple[Callable[..., tuple[Array, Array]], Array, slice]] = []
+        self.laws: list[tuple[Callable[..., tuple[Array, Array]], Array, slice]] = []
         read, act = [np.zeros((0, 2 * n))], [np.zeros((0, 2 * n))]
         columns = 0
         for element, c in self.smooth:
@@ -139,8 +139,9 @@ class Field:
                 read.append(np.hstack([zero, inputs * self.lengths * reference]))
             act.append(np.concatenate([np.zeros(n), -velocity_per_force @ element.direction(n)])[None])
             first, columns = columns, columns + len(inputs) * (1 + element.depends_on_velocity)
-            self._laws.append((law.tangent, c, slice(first, columns)))
-        self._read, self._act = np.ascontiguousarray(np.vstack(read).T), np.vstack(act)
+            self.laws.append((law.tangent, c, slice(first, columns)))
+        #: what the laws read, as columns (2n, Q), and the rates that a unit of their forces makes, (L, 2n)
+        self.read, self.act = np.ascontiguousarray(np.vstack(read).T), np.vstack(act)
 
         along = np.array([s.side * s.direction for s in self.switches]).reshape(-1, n)
         gap = np.array([s.side * s.gap for s in self.switches])
@@ -152,6 +153,8 @@ class Field:
         self._gap_size = size
         self._piecewise: dict[bytes, tuple[Array, Array]] = {}
         self._spectra: dict[bytes, tuple[NDArray[np.complex128], ...]] = {}
+        #: rates with their solutions (`linear_flow`), by the contacts that are closed, and whether with the slope
+        self.rates: dict[tuple[bytes, bool], RightHandSide] = {}
 
     def at_frequency(self, omega: float) -> Field:
         """The same field, with the same scales and reference frequency, at another `omega`."""
@@ -185,8 +188,8 @@ class Field:
 
     @property
     def closed(self) -> bool:
-        """Whether the flow between contacts is taken in closed form: linear, and of too many modes to be stepped."""
-        return not self.smooth and self.n > FEW
+        """Whether the linear part of the flow is taken in closed form: structures have fast modes, which are stiff."""
+        return self.n > FEW or isinstance(self.system, ProjectedSystem)
 
     def spectrum(self, active: NDArray[np.bool_]) -> tuple[NDArray[np.complex128], ...]:
         """Eigenvalues (2n,) and vectors of `linear_rate`, and their inverse, (2n, 2n)."""
@@ -199,7 +202,7 @@ class Field:
     def right_hand_side(self, active: NDArray[np.bool_], slope: bool = False) -> RightHandSide:
         """The rate of the stacked rows per unit of `tau`, contacts frozen as in `active` (one flag per switch)."""
         matrix, constant = self._matrices(active)
-        m, laws, read, act = 2 * self.n, self._laws, self._read, self._act
+        m, laws, read, act = 2 * self.n, self.laws, self.read, self.act
         loads, amplitude, push = self.loads, self.loads.amplitude, self._push
         harmonic, phase = loads.harmonic, loads.phase
         relative = self.reference / self.omega

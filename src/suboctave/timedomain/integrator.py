@@ -4,8 +4,8 @@ DOP853 (Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, in S
 switch of the field changes sign. Those are found on the interpolant of a step, then reached by an integration of their
 own and refined by Newton, because an error `d` in the instant is one of order `stiffness d` in the tangent. A pair of
 crossings inside one step (a near-grazing contact) shows as an extremum of the distance and is looked for there.
-The force is continuous at a gap, so the state-transition matrix goes through without a jump. Piecewise-linear systems
-of many degrees of freedom are not stepped but solved between their contacts (`linear_flow`).
+The force is continuous at a gap, so the state-transition matrix goes through without a jump. The linear part of
+structures is not stepped but solved between their contacts (`linear_flow`).
 """
 
 from __future__ import annotations
@@ -67,15 +67,13 @@ class Passage:
     steps: list[Step] = field(default_factory=list)
     tau: list[float] = field(default_factory=list)
     states: list[Array] = field(default_factory=list)
-    #: stretches between changes of switches: how long, in tau, and which act
-    stretches: list[tuple[float, NDArray[np.bool_]]] = field(default_factory=list)
 
 
 def _solver(rhs: Any, begin: float, y: Array, end: float, rtol: float, atol: float, first: float | None) -> Any:
     if first is not None:
         first = min(first, end - begin)
     if isinstance(rhs, ExactRate):
-        return ExactSolver(rhs, begin, y, end, first)
+        return ExactSolver(rhs, begin, y, end, rtol, first)
     return scipy.integrate.DOP853(rhs, begin, y, end, rtol=rtol, atol=atol, first_step=first)
 
 
@@ -87,11 +85,12 @@ def _zero(function: Callable[[float], float], a: float, b: float) -> float:
 def _step(solver: DOP853, model: Field) -> None:
     check_time()
     message = solver.step()
-    if solver.status == "failed" or not np.all(np.isfinite(solver.y)):
+    state = _states(solver, model)[1]
+    if solver.status == "failed" or not np.all(np.isfinite(state)):
         raise ConvergenceError(
             f"the integration stopped at t = {solver.t / model.omega:.6g} (omega = {model.omega:.6g}): {message}. "
             "The motion grows without bound, or an element returns values that are not finite: check its force over "
-            f"the range reached (largest scaled component {np.max(np.abs(solver.y[: 2 * model.n])):.3g}), the sign of "
+            f"the range reached (largest scaled component {np.max(np.abs(state)):.3g}), the sign of "
             "the damping, and the state at the start"
         )
 
@@ -107,6 +106,13 @@ def reach(model: Field, rhs: Any, begin: float, y: Array, end: float, rtol: floa
 def _at_start(solver: DOP853) -> Array:
     """The stacked state at the start of the solver's last step."""
     return np.asarray(solver.y_old, dtype=float)
+
+
+def _states(solver: Any, model: Field) -> tuple[Array, Array]:
+    """The states (2n,) at the start and at the end of the solver's last step."""
+    if isinstance(solver, ExactSolver):
+        return solver.state_old, solver.state
+    return solver.y_old[: 2 * model.n], solver.y[: 2 * model.n]
 
 
 class _Watch:
@@ -135,7 +141,7 @@ class _Watch:
     def first_change(self, solver: DOP853) -> tuple[float, int] | None:
         """The earliest instant in the solver's last step at which a switch changes, and which one; else None."""
         m, h = 2 * self.model.n, solver.t - solver.t_old
-        old, new = _at_start(solver)[:m], solver.y[:m]
+        old, new = _states(solver, self.model)
         (start, leaving), (end, arriving) = self._margins(old), self._margins(new)
         reach = 2.0 * h * np.maximum(np.abs(leaving), np.abs(arriving))
         near = np.flatnonzero((end < 0.0) | (np.minimum(np.abs(start), np.abs(end)) <= reach))
@@ -230,18 +236,16 @@ def advance(
             _step(solver, model)
             change = watch.first_change(solver) if len(watch.active) else None
             if change is None:
-                _record(out, solver, solver.t, solver.y, watch, m, dense)
+                _record(out, solver, solver.t, _states(solver, model)[1], watch, m, dense)
                 continue
             length = solver.t - solver.t_old
             at, y_at = watch.land(rhs, solver, change[0], change[1], rtol, atol)
             if at > solver.t_old:
                 _record(out, solver, at, y_at, watch, m, dense)
-            out.stretches.append((at - tau, watch.active.copy()))
             out.contacts.append(watch.change(at, change[1]))
             tau, y = at, y_at
             break
         else:
-            out.stretches.append((solver.t - tau, watch.active.copy()))
             tau, y = solver.t, solver.y
     out.y = y
     return out

@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.linalg import expm
 
 from suboctave.errors import InputError
 from suboctave.model import System
@@ -133,17 +132,10 @@ def flow(
 ) -> tuple[Array, Array, Passage]:
     """Scaled state at the end, scaled state-transition matrix (2n, 2n, or 2n + 1 columns with `slope`), the passage."""
     m = 2 * model.n
-    closed = model.closed
-    rows = np.vstack([z[None, :], np.eye(0 if closed else m, m)] + ([np.zeros((1, m))] if slope else []))
+    rows = np.vstack([z[None, :], np.eye(m)] + ([np.zeros((1, m))] if slope else []))
     passage = advance(model, begin, rows.ravel(), end, rtol, rtol, slope=slope)
     final = passage.y.reshape(-1, m)
-    if not closed:
-        return final[0].copy(), final[1:].T.copy(), passage
-    columns = np.eye(m)
-    for length, active in passage.stretches:
-        # between contacts the field is linear, at them it is continuous
-        columns = expm(length * model.linear_rate(active)) @ columns
-    return final[0].copy(), np.concatenate((columns, final[1:].T), axis=1), passage
+    return final[0].copy(), final[1:].T.copy(), passage
 
 
 def largest_displacement(model: Field, passage: Passage, dof: int) -> float:

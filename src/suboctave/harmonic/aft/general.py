@@ -17,7 +17,7 @@ with `eta.a = sum_s eta_s a_s`.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -29,7 +29,6 @@ from suboctave.harmonic.quadrature import (
     FEWEST,
     GAUSS,
     MOST,
-    SETTLED,
     Nodes,
     between_corners,
     graded_nodes,
@@ -118,7 +117,7 @@ class GeneralLaw(LawAlong):
         if isinstance(kind, CornerSampling):
             return Smoothness(kind.points, kind.velocities, kind.rough, cornered=True)
         if isinstance(kind, SharpVelocitySampling):
-            return Smoothness(sharp_velocities=(kind.velocities, kind.widths), sharp=True)
+            return Smoothness(sharp_velocities=(kind.velocities, kind.widths), sharp=True, degree=1 + kind.degree)
         if isinstance(kind, PolynomialSampling):
             return Smoothness(degree=self._degree)
         return Smoothness(sharp=isinstance(kind, SharpSampling), unknown=isinstance(kind, AdaptiveSampling))
@@ -144,9 +143,10 @@ class GeneralLaw(LawAlong):
         if isinstance(kind, PolynomialSampling):
             return polynomial_nodes(self._degree * along.high + varying, along.top)
         if isinstance(kind, SharpVelocitySampling):
+            highest = along.top + kind.degree * along.high
             if not self._velocity.any():
-                return polynomial_nodes(along.top + 1, along.top)
-            return graded_nodes(self._velocity, np.array(kind.velocities), np.array(kind.widths), along.top)
+                return polynomial_nodes(highest + 1, along.top)
+            return graded_nodes(self._velocity, np.array(kind.velocities), np.array(kind.widths), highest)
         if isinstance(kind, SharpSampling):
             sharp = [m.kind for m in self.members if isinstance(m.kind, SharpSampling)]
             points, widths = (
@@ -328,7 +328,7 @@ class GeneralLaw(LawAlong):
                     parts.append(_finite_part(self, corner))
         return parts
 
-    def settled_samples(self, member: Member) -> int | None:
+    def settled_samples(self, member: Member, settled: Callable[[ComplexArray, ComplexArray], bool]) -> int | None:
         """See `LawAlong.settled_samples`.
 
         Raises
@@ -344,21 +344,16 @@ class GeneralLaw(LawAlong):
         while count <= MOST:
             current = np.zeros((1 + along.size, along.top + 1), dtype=complex)
             GeneralLaw(along, [member._replace(samples=count)]).add_spectra(current)
-            if previous is not None and _relative_change(previous, current) < SETTLED:
+            if previous is not None and settled(previous, current):
                 return count // 2
             previous, count = current, 2 * count
         raise ConvergenceError(
             f"{member.element.label}: the force does not settle with {MOST} samples per period: it is too sharp to be "
-            "sampled blindly. Tell where its law is sharp or has corners (sampling returning SharpSampling(points, "
-            "widths) or CornerSampling), write it as a text (Expression), whose corners are located, or use an exact "
-            "piecewise-linear element"
+            "sampled blindly. Of a text (Expression) places are known where it has corners (abs, max, ...), or is "
+            "sharp as tanh or atan of one velocity times a polynomial; a class of your own can tell them (sampling "
+            "returning SharpSampling(points, widths) or CornerSampling). Elements that are exact: ElasticStop, "
+            "Freeplay, TanhFriction"
         )
-
-
-def _relative_change(a: ComplexArray, b: ComplexArray) -> float:
-    """Largest change of a row of spectra in units of its largest coefficient."""
-    size = np.maximum(np.abs(b).max(axis=1), np.finfo(float).tiny)
-    return float((np.abs(b - a).max(axis=1) / size).max())
 
 
 def _finite_part(law: GeneralLaw, corner: Corner) -> Third:

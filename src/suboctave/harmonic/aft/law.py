@@ -24,7 +24,7 @@ besides Dirac functions with the jumps of f_rs. A piecewise-linear law has nothi
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -165,8 +165,8 @@ class LawAlong(ABC):
         top + 1).
         """
 
-    def settled_samples(self, member: Member) -> int | None:
+    def settled_samples(self, member: Member, settled: Callable[[ComplexArray, ComplexArray], bool]) -> int | None:
         """Number of samples with which force and tangent of one of its elements have settled; None where the smoothness
-        decides.
+        decides. `settled`: whether spectra of both (1 + Q, top + 1) with half the samples, and with all, are the same.
         """
         return None

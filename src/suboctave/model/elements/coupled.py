@@ -163,8 +163,9 @@ class Expression(CoupledElement):
     forces that depend on several: `Expression(0, "k*x*y**2", inputs={"x": 0, "y": (1, 2)})`; then only those names are
     states, and their velocities are written with a prime.
 
-    Corners (`abs`, `max`, ..) at places that do not depend on other states are integrated exactly, others by as many
-    samples as it takes. A force that jumps is refused.
+    Corners (`abs`, `max`, ..) at places that do not depend on other states are integrated exactly, and steps
+    `tanh(v/v0)` and `atan` of one velocity times polynomials however steep they are, others by as many samples as it
+    takes. A force that jumps is refused.
     """
 
     def __init__(
@@ -216,7 +217,7 @@ class Expression(CoupledElement):
         return WrittenForm(self._law)
 
     def sampling(self, c: Array) -> Sampling:
-        """What the text shows: a polynomial, corners, or nothing."""
+        """What the text shows: a polynomial, corners, steps in a velocity, or nothing."""
         return self._law.sampling(c)
 
     tangent = _of_law("tangent")

@@ -179,11 +179,13 @@ class CornerSampling:
 class SharpVelocitySampling:
     """Analytic on the real axis, with complex singularities at `v = velocities[i] +- 1j * widths[i]` (length / time).
 
-    For elements with `own_nodes`: nodes are graded towards the instants at which the velocity passes there.
+    For elements with `own_nodes`: nodes are graded towards the instants at which the velocity passes there; of a
+    coupled element it is that of its first input. `degree`: of the polynomial in `(u, v)` that multiplies sharp steps.
     """
 
     velocities: tuple[float, ...]
     widths: tuple[float, ...]
+    degree: int = 0
     whole = False
 
     def __post_init__(self) -> None:

@@ -18,7 +18,13 @@ from numpy.typing import NDArray
 
 from suboctave.errors import InputError
 from suboctave.model.elements.base import Array
-from suboctave.model.elements.smoothness import AdaptiveSampling, CornerSampling, PolynomialSampling, Sampling
+from suboctave.model.elements.smoothness import (
+    AdaptiveSampling,
+    CornerSampling,
+    PolynomialSampling,
+    Sampling,
+    SharpVelocitySampling,
+)
 from suboctave.model.expressions.derivatives import (
     CORNER_FUNCTIONS,
     Modulus,
@@ -39,6 +45,8 @@ from suboctave.model.expressions.reader import PRIME
 #: symbol of the phase omega t of the load
 _THETA = "omega*t"  # no identifier, so that no parameter can have this name
 _HIGHEST_DEGREE = 30
+#: distance from the real axis at which functions of a real argument have their nearest singularity
+_SINGULAR = {sympy.tanh: sympy.pi / 2, sympy.atan: 1}
 _OPERATIONS = 5000
 
 
@@ -59,7 +67,8 @@ class Law:
     coefficients
         Names that are neither states nor time.
     corner_input
-        Which of the displacements has the corners; they are known as such if it is the first.
+        Which of the displacements has the corners, or the velocity that steps of tanh and atan are of; they are known
+        as such if it is the first.
     phase, rough
         The symbol of omega t; whether a power that is no integer begins at a corner.
     depends_on_velocity, time_harmonic
@@ -92,6 +101,8 @@ class Law:
         self._sorted = sorted(self.c, key=str)
         self._ranks = [self._sorted.index(one) for one in self.c]
         self.corner_input = 0
+        #: velocities and widths at which tanh and atan are singular, as expressions
+        self._steps: list[tuple[Any, Any]] = []
         self._degree, self._corner_places = self._smoothness()
         powers = [power for power in self.expression.atoms(sympy.Pow) if not power.exp.is_integer]
         self.rough = any(power.base.has(Ramp, Modulus, Step) for power in powers)
@@ -104,7 +115,7 @@ class Law:
         """Degree of a polynomial (else None); rows of q and places of corners, None if they cannot be told."""
         arguments = self.corners()
         if not arguments:
-            return self._polynomial(), []
+            return self._smooth(), []
         places = [self._place(argument) for argument in arguments]
         for argument, place in zip(arguments, places, strict=True):
             self._check_continuous(argument, place)
@@ -151,12 +162,34 @@ class Law:
         if not np.all(np.abs(upper - lower) <= 1e-9 * (1.0 + np.abs(upper) + np.abs(lower))):
             raise InputError(f"{self.where}: {jump}")
 
-    def _polynomial(self) -> int | None:
-        """Total degree in q of a polynomial whose time enters by sines and cosines, else None."""
-        waves = [wave for wave in self.expression.atoms(sympy.sin, sympy.cos) if self.phase in wave.free_symbols]
-        generators = [*self.q, *sympy.symbols(f"wave_:{len(waves)}")]
-        harmonics = [0] * len(self.q) + [abs(int(wave.args[0].coeff(self.phase))) for wave in waves]
-        swapped = self.expression.xreplace(dict(zip(waves, generators[len(self.q) :], strict=True)))
+    def _smooth(self) -> int | None:
+        """Degree of a polynomial in q and in steps, tanh and atan, of one velocity that it may have, else None."""
+        steps = [one for one in self.expression.atoms(*_SINGULAR) if one.free_symbols & {*self.q, self.phase}]
+        steps.sort(key=str)
+        places = [self._place(step.args[0]) for step in steps]
+        known = [place for place in places if place is not None and place[0] >= self.count]
+        if len(known) < len(steps) or len({row for row, _ in known}) > 1 or (steps and self.time_harmonic):
+            return None
+        marks = sympy.symbols(f"step_:{len(steps)}")
+        degree = self._polynomial(self.expression.xreplace(dict(zip(steps, marks, strict=True))), marks)
+        if degree is None or not steps:
+            return degree
+        row = known[0][0]
+        self.corner_input = row - self.count
+        if self.corner_input:
+            return None
+        slopes = [step.args[0].diff(self.q[row]) for step in steps]
+        widths = [_SINGULAR[step.func] / sympy.Abs(slope) for step, slope in zip(steps, slopes, strict=True)]
+        self._steps = [(place[1], width) for place, width in zip(known, widths, strict=True)]
+        return degree
+
+    def _polynomial(self, expression: Any, steps: Sequence[Any]) -> int | None:
+        """Total degree in q of a polynomial in q and steps whose time enters by sines and cosines, else None."""
+        waves = [wave for wave in expression.atoms(sympy.sin, sympy.cos) if self.phase in wave.free_symbols]
+        signs = sympy.symbols(f"wave_:{len(waves)}")
+        generators = [*self.q, *steps, *signs]
+        harmonics = [0] * (len(self.q) + len(steps)) + [abs(int(wave.args[0].coeff(self.phase))) for wave in waves]
+        swapped = expression.xreplace(dict(zip(waves, signs, strict=True)))
         plain = self.phase not in swapped.free_symbols and swapped.is_polynomial(*generators)
         if not plain or expanded_size(swapped) > 1000:
             return None
@@ -168,15 +201,25 @@ class Law:
 
     def sampling(self, c: Array) -> Sampling:
         """How smooth the law is at these coefficients."""
+        if self._steps:
+            values = self._numbers("steps", [one for step in self._steps for one in step], c)
+            # a step without slope is none
+            there = [pair for pair in zip(values[::2], values[1::2], strict=True) if np.isfinite(pair[1])]
+            return SharpVelocitySampling(tuple(v for v, _ in there), tuple(w for _, w in there), self._degree or 0)
         if self._degree is not None:
             return PolynomialSampling(max(1, self._degree))
         if not self._corner_places:
             return AdaptiveSampling()
         rows, places = zip(*self._corner_places, strict=True)
-        values = self._code("corners", lambda: places)(np.zeros((len(self.q), 1)), np.zeros(1), c)[:, 0].tolist()
+        values = self._numbers("corners", places, c)
         points = {value for row, value in zip(rows, values, strict=True) if row == 0}
         velocities = {value for row, value in zip(rows, values, strict=True) if row}
         return CornerSampling(tuple(sorted(points)), tuple(sorted(velocities)), self.rough)
+
+    def _numbers(self, what: str, parts: Sequence[Any], c: Array) -> list[float]:
+        """Values of expressions of the coefficients."""
+        values: list[float] = self._code(what, lambda: parts)(np.zeros((len(self.q), 1)), np.zeros(1), c)[:, 0].tolist()
+        return values
 
     # ------------------------------------------------------------------------------------------------ derivatives
     def _code(self, what: str, parts: Callable[[], Sequence[Any]]) -> Callable[..., Array]:
