@@ -110,3 +110,9 @@ def test_loads_of_several_harmonics_on_a_nonlinear_oscillator():
     for orbit in (curve.orbits[0], curve.orbits[-1]):
         check = so.verify(orbit, tolerance=1e-8)
         assert check.agrees, check
+
+
+def test_a_response_with_a_stop_may_have_one_harmonic():
+    """There are no fewer ones to tell from what neglected harmonics do beside a grazing."""
+    response = so.frequency_response(so.library.reference_oscillator(p=0.55, j=0.0), (4.5, 1.3), harmonics=1)
+    assert response.ended == "reached the end of the range at omega = 1.3"

@@ -94,8 +94,14 @@ def test_branch_points_of_rest_are_tracked():
     system = so.library.mathieu_duffing(eps=0.6)
     first = so.frequency_response(system, (0.4, 3.0)).bifurcations["BP"][0]
     curve = so.track(first, "eps", (0.05, 1.0))
-    (tip,) = curve.bifurcations
+    (tip,), (turn,) = curve.extrema, curve.bifurcations["GPF"]
     assert tip.remark().startswith("minimum of eps")
+    low, high = tip.parameter("eps"), turn.parameter("eps")
+    # beside the tip both pitchforks are of one kind, farther up the tongue one of each
+    for eps, kinds in ((0.5 * (low + high), 1), (2.0 * high - low, 2)):
+        beside = so.frequency_response(system.with_parameters({"eps": eps}), (0.9, 1.08), max_step=0.01)
+        assert len(beside.bifurcations["BP"]) == 2
+        assert len({item.criticality for item in beside.bifurcations["BP"]}) == kinds
     assert curve.amplitude.max() == 0.0
     eps = curve.parameter("eps")
     crossings = np.flatnonzero(np.diff(np.sign(eps - 0.65)))

@@ -49,8 +49,10 @@ def test_in_other_parameters_than_those_in_which_it_was_found(border):
     assert limits.orbits[0].basis.nu == 2
     for curve in (limits, doublings):
         (there,) = curve.bifurcations["GPD"]
-        assert there.parameter("Kc") == pytest.approx(event.parameters["Kc"], rel=1e-8)
-        assert there.omega == pytest.approx(event.omega, rel=1e-8)
+        # located with other numbers of harmonics, each to what it says
+        off = 1e-8 + event.uncertainty + there.uncertainty
+        assert there.parameter("Kc") == pytest.approx(event.parameters["Kc"], rel=off)
+        assert there.omega == pytest.approx(event.omega, rel=off)
 
 
 def test_a_period_doubling_in_the_doubled_basis_is_no_limit_point_to_follow(border):

@@ -19,7 +19,7 @@ INTERNAL = (
     "the harmonic at {} omega is not kept",
     "the system does not tell where on the response curve to look",
     "two extrema or singular points fall together",
-    "two branches meet at the ridge",
+    "two ridges meet",
     "no crossing of curves was found beside",
     "no other curve crosses at",
     "the direction of the curve at",
