@@ -154,7 +154,8 @@ def _doubt_beside(item: Bifurcation, bifurcations: Sequence[Bifurcation]) -> str
     """
     within = _others_open(item)
     for other in bifurcations:
-        if other is not item and abs(other.arclength - item.arclength) <= _AT_ONCE:
+        together = abs(other.arclength - item.arclength) <= _AT_ONCE and other.kind not in CONTACT_KINDS
+        if together and other is not item:
             critical = other.critical_multiplier()
             away = np.minimum(np.abs(item.multipliers - critical), np.abs(item.multipliers - np.conj(critical)))
             within &= away > _AT_ONCE
