@@ -205,3 +205,13 @@ def test_hopf_points_and_limit_points_meet_in_a_bogdanov_takens_point():
     from_there = so.track(hopf.bifurcations[0], "d", (-1.0, 1.0))
     assert from_there.kind == "LP"
     assert np.abs(from_there.parameter("b")).max() < 1e-9
+
+
+def test_a_driven_motion_of_one_harmonic_is_no_equilibrium():
+    """Though the load of the system as it was made is zero: the frequency stays as it is."""
+    system = so.library.duffing(c=0.05, alpha=1.0, F=0.0)
+    rising = so.continue_branch(system, "F", (0.0, 1.0), omega=1.5, harmonics=1)
+    limits = so.track(rising.bifurcations["LP"][0], ["F", "alpha"], ((0.01, 2.0), (0.2, 3.0)))
+    # the scale of the displacement: F^2 alpha is the same all along
+    assert np.ptp(limits.parameter("F") ** 2 * limits.parameter("alpha")) < 1e-9
+    assert set(limits.omega) == {1.5}

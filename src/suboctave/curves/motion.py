@@ -217,7 +217,10 @@ class MotionProblem:
     @lazy
     def still(self) -> bool:
         """Whether its motions are equilibria: nothing drives them, and nothing holds a phase."""
-        driven = "omega" in self.names or self.balance.system.driven
+        system, at = self.balance.system, {**self.balance.values, **self.held, "omega": self.omega}
+        loads = [load.amplitude for load in system.load_components() if load.harmonic > 0]
+        driven = "omega" in self.names or system.excited_by_elements
+        driven = driven or any(set(load.names) & set(self.names) or load.value(at) != 0.0 for load in loads)
         return not (driven or self.augmentation.free_phase) and self.balance.basis.harmonics == 1
 
     def alike(self, other: MotionProblem) -> bool:
