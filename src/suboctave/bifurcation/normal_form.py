@@ -112,13 +112,14 @@ class NormalForm:
 
 @dataclass(frozen=True)
 class Terms:
-    """Coefficients at one motion, the sizes of the sums that those which decide are made of, and the unit that the
-    length of psi gives them.
+    """Coefficients at one motion, the sizes of the sums that those which decide are made of, the unit that the length
+    of psi gives them, and the sign of psi beside that given.
     """
 
     coefficients: dict[str, float]
     sizes: dict[str, float]
     unit: float
+    turn: float = 1.0
 
 
 def with_criticality(form: NormalForm) -> NormalForm:
@@ -284,7 +285,8 @@ def branch_point(state: BalanceState, vectors: NullVectors, name: str, kappa: fl
     # is located as well as rounding allows, c may have no other size
     parameter = abs(state.omega if name == "omega" else state.values[name])
     quadratic = max(_quadratic_size(own), math.sqrt(abs(c3 * b) * parameter))
-    return Terms(coefficients, {"c3": cubic_size, "g": own.g_size, "c": quadratic}, own.g_size)
+    turn = math.copysign(1.0, float(np.vdot(own.psi, unweighted(state, vectors.left)).real))
+    return Terms(coefficients, {"c3": cubic_size, "g": own.g_size, "c": quadratic}, own.g_size, turn)
 
 
 def pitchfork_coefficient(state: BalanceState, vectors: NullVectors, name: str) -> float:
@@ -292,8 +294,7 @@ def pitchfork_coefficient(state: BalanceState, vectors: NullVectors, name: str) 
     terms = branch_point(state, vectors, name, 0.0)
     if abs(terms.coefficients["c"]) > _SYMMETRIC * terms.sizes["c"]:
         return 0.0
-    turn = float(np.vdot(Expansion.of(state, Kind.INTEGER, vectors, name).psi, unweighted(state, vectors.left)).real)
-    return math.copysign(1.0, turn) * terms.coefficients["c3"]
+    return terms.turn * terms.coefficients["c3"]
 
 
 def _quadratic_size(own: Expansion) -> float:

@@ -26,7 +26,6 @@ from suboctave.curves.events.monitors import (
     PERIOD_DOUBLING,
     BifurcationKind,
     Located,
-    PairAmong,
     changes,
     locate,
     multiple,
@@ -471,8 +470,7 @@ class _Follower(Driver):
 
     def _changes(self, a: Sample, b: Sample) -> list[BifurcationKind]:
         """The kinds to look for between two samples, as they are to be solved for."""
-        own = [(kind, kind.multiplicity > 1 or isinstance(kind, PairAmong)) for kind in changes(a, b)]
-        kinds = [kind if as_it_is else self._kinds[kind.name] for kind, as_it_is in own]
+        kinds = [kind if kind.one_way else self._kinds[kind.name] for kind in changes(a, b)]
         return kinds if self._watch is None else [kind for kind in kinds if kind.name != "PD" or kind.multiplicity > 1]
 
     def _insert(self, item: Bifurcation) -> bool:

@@ -217,11 +217,12 @@ class MotionProblem:
     @lazy
     def still(self) -> bool:
         """Whether its motions are equilibria: nothing drives them, and nothing holds a phase."""
+        if "omega" in self.names or self.augmentation.free_phase or self.balance.basis.harmonics > 1:
+            return False
         system, at = self.balance.system, {**self.balance.values, **self.held, "omega": self.omega}
         loads = [load.amplitude for load in system.load_components() if load.harmonic > 0]
-        driven = "omega" in self.names or system.excited_by_elements
-        driven = driven or any(set(load.names) & set(self.names) or load.value(at) != 0.0 for load in loads)
-        return not (driven or self.augmentation.free_phase) and self.balance.basis.harmonics == 1
+        loaded = any(set(load.names) & set(self.names) or load.value(at) != 0.0 for load in loads)
+        return not (loaded or system.excited_by_elements)
 
     def alike(self, other: MotionProblem) -> bool:
         """Whether two members of a curve have the same discretisation."""

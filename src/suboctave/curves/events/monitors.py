@@ -64,6 +64,8 @@ class BifurcationKind(ABC):
     counted: bool = False
     #: how many bifurcations of the kind fall together
     multiplicity: int = 1
+    #: whether it is solved for in one way only, whatever the formulation
+    one_way: bool = False
 
     def __init__(self, formulation: Formulation = BORDERED) -> None:
         self.formulation = formulation
@@ -209,6 +211,8 @@ class PairAmong(NeimarkSacker):
     among these, ascending: as the modes of oscillators with equal dampers do.
     """
 
+    one_way = True
+
     def __init__(self, rank: int, count: int) -> None:
         super().__init__()
         self.rank, self.count = rank, count
@@ -235,6 +239,8 @@ def among(rank: int, count: int) -> PairAmong:
 
 class Multiple(BifurcationKind):
     """Several of a kind fall together, as the modes of equal sectors do."""
+
+    one_way = True
 
     def __init__(self, kind: BifurcationKind, multiplicity: int) -> None:
         super().__init__(kind.formulation)

@@ -84,17 +84,22 @@ class RidgeEquations(Equations):
         return np.append(size / weight, self.of.along)
 
     @lazy
+    def _scaled(self) -> Array:
+        """`[R_X R_p]` in these units, (n, n + 1)."""
+        scaled: Array = self.state.extended_jacobian(self.names[0]) * self._sizes
+        return scaled
+
+    @lazy
     def _units(self) -> tuple[float, float]:
         """What the rows of R and that of G are divided by."""
-        extended = self.state.extended_jacobian(self.names[0]) * self._sizes
-        return float(np.abs(extended).max()), length(self._amplitude[1] * self._sizes[:-1]) or 1.0
+        return float(np.abs(self._scaled).max()), length(self._amplitude[1] * self._sizes[:-1]) or 1.0
 
     @lazy
     def matrix(self) -> Array:
         """B in these units, (n + 1, n + 1)."""
-        (force, amplitude), n = self._units, len(self._sizes) - 1
+        (force, amplitude), n = self._units, len(self._scaled)
         matrix = np.zeros((n + 1, n + 1))
-        matrix[:n] = self.state.extended_jacobian(self.names[0]) * self._sizes / force
+        matrix[:n] = self._scaled / force
         matrix[n, :n] = self._amplitude[1] * self._sizes[:-1] / amplitude
         return matrix
 

@@ -442,6 +442,7 @@ def _settled(event: LocatedEvent, newton: NewtonOptions, warnings: list[str]) ->
 
 
 def _lost(event: LocatedEvent, sample: Sample, basis: HarmonicBasis, failure: ConvergenceError) -> str:
+    """A sentence on an event that other harmonics do not have."""
     return (
         f"{event.test.kind} near {sample.where} was located with {sample.state.basis.harmonics} harmonics; with "
         f"{basis.harmonics} it was not found again ({failure})"

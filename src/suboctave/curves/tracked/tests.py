@@ -24,6 +24,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -296,28 +297,24 @@ class GeneralisedDoubling(CurveTest):
 
 
 @dataclass(frozen=True)
-class GeneralisedPitchfork(CurveTest):
-    """The motions without the symmetry change sides; a curve of their limit points begins."""
+class SidesChange(CurveTest):
+    """GPF on curves of pitchforks, GH on those of Hopf points: the motions that begin there change sides, a curve of
+    their limit points begins. `c3`: the coefficient that vanishes, 0 all along where it says nothing.
+    """
 
-    kind = "GPF"
+    kind: str
+    c3: Callable[[Sample], float]
     of_third_order = True
 
     def value(self, sample: Sample) -> float:
-        return sample.pitchfork
+        return self.c3(sample)
 
     def smooth(self, sample: Sample) -> tuple[float, float]:
-        return super().smooth(sample) if sample.pitchfork else (1.0, 0.0)
+        return super().smooth(sample) if self.c3(sample) else (1.0, 0.0)
 
 
-@dataclass(frozen=True)
-class GeneralisedHopf(CurveTest):
-    """The limit cycles that begin change sides; a curve of their limit points begins."""
-
-    kind = "GH"
-    of_third_order = True
-
-    def value(self, sample: Sample) -> float:
-        return sample.lyapunov
+#: c3 is kept by the sample
+_PITCHFORKS, _HOPF_POINTS = SidesChange("GPF", lambda s: s.pitchfork), SidesChange("GH", lambda s: s.lyapunov)
 
 
 @dataclass(frozen=True)
@@ -554,7 +551,7 @@ _OF_BIFURCATIONS: dict[Kind, tuple[CurveTest, ...]] = {
 #: the same of equilibria
 _OF_EQUILIBRIA: dict[Kind, tuple[CurveTest, ...]] = {
     Kind.INTEGER: (Cusp(), DoubleMultiplier("R1"), PairCrossing("LPNS")),
-    Kind.FREE: (GeneralisedHopf(), RealCrossing("LPNS", Kind.INTEGER), PairCrossing("NSNS")),
+    Kind.FREE: (_HOPF_POINTS, RealCrossing("LPNS", Kind.INTEGER), PairCrossing("NSNS")),
 }
 #: the same of limit cycles
 _OF_CYCLES: dict[Kind, tuple[CurveTest, ...]] = {
@@ -586,7 +583,7 @@ def tests_of(curve: MotionProblem) -> tuple[CurveTest, ...]:
         peaks = (PeakTurns(),) if isinstance(own, Ridge) else ()
         return (*turns, *peaks, *_OF_MOTIONS)
     if isinstance(own, BranchPointUnfolded):
-        return (*turns, DoubleMultiplier("R1"), GeneralisedPitchfork())
+        return (*turns, DoubleMultiplier("R1"), _PITCHFORKS)
     if not isinstance(own, SingularOperator):
         return turns
     known = _OF_EQUILIBRIA if curve.still else _OF_BIFURCATIONS
