@@ -176,8 +176,8 @@ _REACH = 2.0
 _LARGEST = 3000
 #: share of two effects that cancel (truncated motion, truncated perturbation) by which they are taken not to
 _CANCELLED = 0.05
-#: quotients in which a root is found, or there is none
-_QUOTIENTS = 12
+#: quotients in which a root is found, or there is none, and a step whose square counts no more
+_QUOTIENTS, _STEP = 12, 1e-6
 
 
 def exponents(system: Variational, harmonics: int) -> ComplexArray:
@@ -461,14 +461,14 @@ def _beside(
     root = _root(state, starts[j])
     if root is None:
         return None
-    s, left, right = root
+    s, left, right, _ = root
     motion, alternative = refinement
     more = ((motion.basis.harmonics - state.basis.harmonics) * state.balance.size,) * 2
-    middle = s + _quotient(motion, s, np.pad(left, more), np.pad(right, more))[0]
+    middle = s + _quotient(motion, s, _operator(motion, s), np.pad(left, more), np.pad(right, more))[0]
     better = _root(motion, middle)
     if better is None or int(np.abs(_apart(starts, better[0])).argmin()) != j:
         return None
-    doubt = _quotient(motion, *better)[1]
+    doubt = better[3]
     if alternative is not None:
         other = _root(alternative, better[0])
         doubt = math.inf if other is None else doubt + abs(other[0] - better[0])
@@ -480,26 +480,35 @@ def _beside(
     return mu, _of_multiplier(mu, spread)
 
 
-def _root(state: BalanceState, s: complex) -> tuple[complex, ComplexArray, ComplexArray] | None:
-    """A root of the determinant of J_kappa beside an exponent, with its left and right vector: by inverse iteration and
-    two-sided Rayleigh quotients (Ruhe, SIAM J. Numer. Anal. 10 (1973) 674-689), which converge cubically.
+def _operator(state: BalanceState, s: complex) -> ComplexArray:
+    """J_kappa at an exponent."""
+    return operator(state, Kind.FREE, -1j * s * state.rate)
+
+
+def _root(state: BalanceState, s: complex) -> tuple[complex, ComplexArray, ComplexArray, float] | None:
+    """A root of the determinant of J_kappa beside an exponent, its left and right vector, and its rounding error: by
+    inverse iteration and two-sided Rayleigh quotients (Ruhe, SIAM J. Numer. Anal. 10 (1973) 674-689), of which the last
+    leaves about the square of its step.
     """
     for _ in range(_QUOTIENTS):
-        right, left = null_vectors(operator(state, Kind.FREE, -1j * s * state.rate))
-        step, rounding = _quotient(state, s, left, right)
+        matrix = _operator(state, s)
+        right, left = null_vectors(matrix)
+        step, rounding = _quotient(state, s, matrix, left, right)
         if not cmath.isfinite(step):
             return None
         s += step
-        if abs(step) <= 1e-12 + rounding:
-            return s, left, right
+        if abs(step) <= _STEP + rounding:
+            return s, left, right, rounding
     return None
 
 
-def _quotient(state: BalanceState, s: complex, left: ComplexArray, right: ComplexArray) -> tuple[complex, float]:
-    """How far the root of `left^H J_kappa right` lies from s to first order, and its rounding error."""
-    kappa = -1j * s * state.rate
-    matrix = operator(state, Kind.FREE, kappa)
-    slope = rate_by_kappa(state, Kind.FREE, left, right, kappa) * state.rate
+def _quotient(
+    state: BalanceState, s: complex, matrix: ComplexArray, left: ComplexArray, right: ComplexArray
+) -> tuple[complex, float]:
+    """How far the root of `left^H J_kappa right` lies from s to first order, and its rounding error; matrix: J_kappa
+    at s.
+    """
+    slope = rate_by_kappa(state, Kind.FREE, left, right, -1j * s * state.rate) * state.rate
     if slope == 0.0:
         return complex(math.nan), math.inf
     rounding = 1e-15 * float(np.abs(left) @ np.abs(matrix) @ np.abs(right)) / abs(slope)

@@ -125,6 +125,48 @@ class Stack(NamedTuple):
         between(self.entries, self.diagonal, frequency.astype(complex), order, left, right, out)
         return out
 
+    def eliminated(self, frequency: NDArray[Any]) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+        """`Z_zz^-1 Z_zq` (F, s, m + l) at frequencies, the transpose of `Z_qz Z_zz^-1` (F, s, m), and what is left of Z
+        at q, (F, m, m + l).
+        """
+        (m, s, columns), count = self.sizes, len(frequency)
+        right, left = np.empty((count, s, columns), dtype=complex), np.empty((count, s, m), dtype=complex)
+        out = np.empty((count, m, columns), dtype=complex)
+        eliminated(self.entries, self.diagonal, frequency.astype(complex), right, left, out)
+        return right, left, out
+
+
+@kernel(fastmath={"contract"}, error_model="numpy")
+def eliminated(entries, diagonal, frequency, right, left, out):
+    """See `Stack`, `Stack.eliminated`."""
+    (s, columns), m = right.shape[1:], left.shape[2]
+    across = m * columns
+    back = across + m * s
+    inner = back + s * columns
+    z = np.empty(entries.shape[1], dtype=np.complex128)
+    for f in range(frequency.shape[0]):
+        by = factors(frequency[f], 0)
+        for i in range(len(z)):
+            z[i] = by[0] * entries[0, i] + by[1] * entries[1, i] + by[2] * entries[2, i] + by[3] * entries[3, i]
+        if diagonal:
+            for k in range(s):
+                flexible = 1.0 / z[inner + k]
+                for j in range(columns):
+                    right[f, k, j] = flexible * z[back + k * columns + j]
+                for i in range(m):
+                    left[f, k, i] = flexible * z[across + i * s + k]
+        else:
+            held, coupling = z[inner:].reshape(s, s), z[across:back].reshape(m, s)
+            right[f] = np.linalg.solve(held, z[back:inner].reshape(s, columns))
+            left[f] = np.linalg.solve(held.T, coupling.T)
+        for i in range(m):
+            for j in range(columns):
+                out[f, i, j] = z[i * columns + j]
+        for i in range(m):
+            for k in range(s):
+                for j in range(columns):
+                    out[f, i, j] -= z[across + i * s + k] * right[f, k, j]
+
 
 @kernel(fastmath={"contract"})
 def between(entries, diagonal, frequency, order, left, right, out):
@@ -186,7 +228,7 @@ class Condensed:
         self._other: Condensed | None = None
         self._wider: Condensed | None = None
         #: what was asked for last, by frequencies
-        self._last: tuple[NDArray[Any], tuple[Blocks, ComplexArray, ComplexArray], dict[Any, Any]] | None = None
+        self._last: tuple[NDArray[Any], tuple[ComplexArray, ComplexArray, dict[Any, Any]]] | None = None
         #: M, C, K, S, (4, r, r)
         self._matrices = np.array([matrix.value(values) for matrix in self.projected.matrices])
         #: the loads' directions in the equation of motion, (l, N)
@@ -302,16 +344,13 @@ class Condensed:
         parts = differentiated(self.projected.matrices, names, self.values)
         return None if parts is None else Stack.of(self._split(parts))
 
-    def _eliminated(self, frequency: NDArray[Any]) -> tuple[Blocks, ComplexArray, ComplexArray]:
-        """Z at frequencies, `Z_zz^-1 Z_zq`, and the transpose of `Z_qz Z_zz^-1`; what was asked for last is kept."""
+    def _eliminated(self, frequency: NDArray[Any]) -> tuple[ComplexArray, ComplexArray, dict[Any, Any]]:
+        """`Z_zz^-1 Z_zq` at frequencies, the transpose of `Z_qz Z_zz^-1`, and what is known there of A and its
+        derivatives; what was asked for last is kept.
+        """
         if self._last is None or self._last[0] is not frequency:
-            whole = self._own.at(frequency, 0)
-            right = whole.solved(whole.zq)
-            left = right if right.shape[2] == self.size else np.ascontiguousarray(right[:, :, : self.size])
-            if not self._symmetric:
-                turned = whole._replace(zz=whole.zz if whole.zz.ndim == 2 else _transposed(whole.zz))
-                left = np.ascontiguousarray(turned.solved(_transposed(whole.qz)))
-            self._last = frequency, (whole, right, left), {}
+            right, left, reduced = self._own.eliminated(frequency)
+            self._last = frequency, (right, left, {(): reduced})
         return self._last[1]
 
     def _differentiated(
@@ -320,23 +359,18 @@ class Condensed:
         """A and P of unit loads, (F, m, m + l), differentiated by at most two things: each some names, or none and an
         order in Omega of one.
         """
-        whole, right, left = self._eliminated(frequency)
-        assert self._last is not None
-        known = self._last[2]
+        right, left, known = self._eliminated(frequency)
         if by not in known:
-            known[by] = self._made(frequency, by, whole, right, left)
+            known[by] = self._made(frequency, by, right, left)
         return known[by]
 
     def _made(
         self,
         frequency: NDArray[Any],
         by: tuple[tuple[tuple[str, ...], int], ...],
-        whole: Blocks,
         right: ComplexArray,
         left: ComplexArray,
     ) -> ComplexArray | None:
-        if not by:
-            return np.ascontiguousarray(whole.qq - whole.qz @ right)
         total = self._stack(tuple(name for one, _ in by for name in one))
         result = None
         if total is not None:
@@ -347,6 +381,7 @@ class Condensed:
         a, b = (sides[one] for one in by)
         if a is None or b is None:
             return result
+        whole = self._own.at(frequency, 0)
         moved: ComplexArray = _transposed(a[0]) @ whole.solved(b[1])
         moved += moved if a is b else _transposed(b[0]) @ whole.solved(a[1])
         return -moved if result is None else result - moved
@@ -355,16 +390,12 @@ class Condensed:
         self, frequency: NDArray[Any], names: tuple[str, ...], order: int
     ) -> tuple[ComplexArray, ComplexArray] | None:
         """`(Z_qz - left^T Z_zz)^T` and `Z_zq - Z_zz right` of Z differentiated; None for zero."""
-        _, right, left = self._eliminated(frequency)
+        right, left, _ = self._eliminated(frequency)
         stack = self._stack(names)
         if stack is None:
             return None
         change = stack.at(frequency, order)
         return change.across(left), change.zq - change.inner(right)
-
-    @lazy
-    def _symmetric(self) -> bool:
-        return all(np.abs(m - m.T).max() <= _ROUNDING * np.abs(m).max() for m in self._matrices)
 
     def fed(self, rate: float) -> Condensed:
         """See `LinearPart.fed`; the coordinates are those of this part."""
@@ -378,7 +409,7 @@ class Condensed:
 
     def feeding(self, frequency: Array) -> ComplexArray:
         """See `LinearPart.feeding`."""
-        _, right, left = self._eliminated(frequency)
+        right, left, _ = self._eliminated(frequency)
         return self._unknowns_alone(self._feeding.between(frequency, 0, left, right))
 
     @lazy
@@ -457,7 +488,7 @@ class Condensed:
         if len(self._loads):
             none = np.zeros((len(amplitudes), len(self._loads)))
             columns = np.concatenate((amplitudes, none if loads is None else -loads), axis=1)
-        inner = (self._eliminated(frequency)[1] @ columns[:, :, None])[:, :, 0]
+        inner = (self._eliminated(frequency)[0] @ columns[:, :, None])[:, :, 0]
         result: ComplexArray = amplitudes @ static.T - inner @ free.T
         return result
 

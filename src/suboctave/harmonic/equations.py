@@ -10,6 +10,7 @@ Cameron & Griffin, J. Appl. Mech. 56 (1989) 149-154 (alternating frequency/time)
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import TypeVar
 
 import numpy as np
@@ -24,7 +25,6 @@ from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
 from suboctave.harmonic.loads import LoadSpectrum, Transfer
 from suboctave.harmonic.quadrature import search_grid
 from suboctave.lazy import lazy
-from suboctave.model.elements.base import BaseElement
 from suboctave.model.elements.coupled import CoupledElement
 from suboctave.model.elements.smoothness import AdaptiveSampling, CornerSampling, Sampling, levels
 from suboctave.model.system import System
@@ -55,6 +55,27 @@ class Laws:
         ]
 
 
+@lru_cache(maxsize=32)
+def _groups_of(system: System, linear: LinearPart) -> tuple[list[Group], list[Group]]:
+    """Elements that share the displacement along one direction, and those with channels of their own: the same for all
+    equations of a structure, as what depends on them and the linear part alone is kept.
+    """
+    alike: dict[bytes, tuple[Array, list[int]]] = {}
+    own = []
+    for i, element in enumerate(system.elements):
+        out = np.asarray(linear.retain(element.direction(system.n)), dtype=float)
+        if element.own_nodes:
+            inputs = np.array([linear.retain(d) for d in element.inputs(system.n)], dtype=float)
+            own.append(Group(out, inputs, (i,), element.depends_on_velocity))
+        else:
+            alike.setdefault(out.tobytes(), (out, []))[1].append(i)
+    shared = [
+        Group(d, d[None], tuple(members), any(system.elements[i].depends_on_velocity for i in members))
+        for d, members in alike.values()
+    ]
+    return shared, own
+
+
 class Equations:
     """Harmonic balance of a system in a basis, without a motion; parameters as in `evaluation.HarmonicBalance`."""
 
@@ -73,8 +94,7 @@ class Equations:
         #: parameters that the linear part depends on
         self.matrix_names = frozenset[str]().union(*(matrix.names for matrix in system.linear_parts))
         #: elements that share the displacement along one direction, and those with channels of their own
-        self.groups = self._grouped()
-        self.own = [self._own_channel(i, e) for i, e in enumerate(system.elements) if e.own_nodes]
+        self.groups, self.own = _groups_of(system, self.linear)
         self.all_groups = (*self.groups, *self.own)
         #: whether any force depends on velocity
         self.any_moving = any(group.moving for group in self.groups)
@@ -114,24 +134,6 @@ class Equations:
         self.loads = LoadSpectrum(self.system, basis, self._load_shapes)
         self._load: tuple[tuple[float, ...], Array] | None = None
         self._row_weights: dict[int, Array] = {}
-
-    def _grouped(self) -> list[Group]:
-        alike: dict[bytes, tuple[Array, list[int]]] = {}
-        for i, element in enumerate(self.system.elements):
-            if not element.own_nodes:
-                d = np.asarray(self.linear.retain(element.direction(self.system.n)), dtype=float)
-                alike.setdefault(d.tobytes(), (d, []))[1].append(i)
-        elements = self.system.elements
-        return [
-            Group(d, d[None], tuple(members), any(elements[i].depends_on_velocity for i in members))
-            for d, members in alike.values()
-        ]
-
-    def _own_channel(self, i: int, element: BaseElement) -> Group:
-        n = self.system.n
-        out = np.asarray(self.linear.retain(element.direction(n)), dtype=float)
-        inputs = np.array([self.linear.retain(d) for d in element.inputs(n)], dtype=float)
-        return Group(out, inputs, (i,), element.depends_on_velocity)
 
     def along(self, dof: int) -> Array:
         """The displacement of a degree of freedom by those unknown, (size,); InputError where they do not hold it."""
