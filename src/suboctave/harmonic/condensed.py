@@ -36,7 +36,6 @@ from suboctave.harmonic.linear_part import (
     StructuralMatrices,
     damping_words,
     differentiated,
-    entries_at,
     factors,
     fed_matrices,
     feeding_matrices,
@@ -60,32 +59,6 @@ _BEYOND = 1.5
 _TOO_FAR = 20.0
 
 
-class Blocks(NamedTuple):
-    """A matrix in the coordinates (q, z) with the loads' columns behind those of q, a stack of one per frequency: qq
-    (F, m, m + l), qz (F, m, s), zq (F, s, m + l) and zz (F, s, s), or its diagonal (F, s).
-    """
-
-    qq: ComplexArray
-    qz: ComplexArray
-    zq: ComplexArray
-    zz: ComplexArray
-
-    def inner(self, vectors: ComplexArray) -> ComplexArray:
-        """`Z_zz v`, v (F, s, m)."""
-        return self.zz[:, :, None] * vectors if self.zz.ndim == 2 else self.zz @ vectors
-
-    def solved(self, vectors: ComplexArray) -> ComplexArray:
-        """`Z_zz^-1 v`."""
-        if self.zz.ndim == 2:
-            return vectors / self.zz[:, :, None]
-        return np.asarray(np.linalg.solve(self.zz, vectors), dtype=complex)
-
-    def across(self, left: ComplexArray) -> ComplexArray:
-        """`(Z_qz - left^T Z_zz)^T`."""
-        inner = self.zz[:, :, None] * left if self.zz.ndim == 2 else _transposed(self.zz) @ left
-        return _transposed(self.qz) - inner
-
-
 class Stack(NamedTuple):
     """M, C, K, S in the coordinates (q, z) with loads' columns, all entries in a row, (4, .); how many q, z and columns
     with those of q; if zz is a diagonal.
@@ -104,23 +77,10 @@ class Stack(NamedTuple):
         rows = [np.concatenate([one.ravel() for one in part]) for part in parts]
         return cls(np.array(rows), (*parts[0][1].shape, parts[0][0].shape[1]), diagonal)
 
-    def at(self, frequency: NDArray[Any], order: int) -> Blocks:
-        """The dynamic stiffness at frequencies, differentiated by Omega."""
-        (m, s, columns), count = self.sizes, len(frequency)
-        values = entries_at(self.entries, frequency, order)
-        a = m * columns
-        b = a + m * s
-        c = b + s * columns
-        inner = values[:, c:] if self.diagonal else values[:, c:].reshape(count, s, s)
-        return Blocks(
-            values[:, :a].reshape(count, m, columns),
-            values[:, a:b].reshape(count, m, s),
-            values[:, b:c].reshape(count, s, columns),
-            inner,
-        )
-
     def between(self, frequency: NDArray[Any], order: int, left: ComplexArray, right: ComplexArray) -> ComplexArray:
-        """`[1 -left^T] Z [1; -right]` of that, (F, m, m + l); left (F, s, m), right (F, s, m + l)."""
+        """`[1 -left^T] Z [1; -right]` of the dynamic stiffness Z, differentiated by Omega, at frequencies, (F, m, m +
+        l); left (F, s, m), right (F, s, m + l).
+        """
         out = np.empty((len(frequency), self.sizes[0], self.sizes[2]), dtype=complex)
         between(self.entries, self.diagonal, frequency.astype(complex), order, left, right, out)
         return out
@@ -135,68 +95,127 @@ class Stack(NamedTuple):
         eliminated(self.entries, self.diagonal, frequency.astype(complex), right, left, out)
         return right, left, out
 
+    def answered(
+        self, frequency: NDArray[Any], a: Stack, b: Stack, orders: tuple[int, int], left: ComplexArray,
+        right: ComplexArray,
+    ) -> ComplexArray:  # fmt: skip
+        """What the eliminated coordinates make of two changes of Z, those of a and b, differentiated by Omega:
+        `(a_qz - left^T a_zz) Z_zz^-1 (b_zq - b_zz right)`, and the same with a and b exchanged, (F, m, m + l).
+        """
+        out = np.empty((len(frequency), self.sizes[0], self.sizes[2]), dtype=complex)
+        answered(
+            self.entries, self.diagonal, frequency.astype(complex), a.entries, a.diagonal, orders[0], b.entries,
+            b.diagonal, orders[1], left, right, out,
+        )  # fmt: skip
+        return out
+
+
+@kernel(fastmath={"contract"})
+def _dynamic(entries, frequency, order, z):
+    """All entries of Z, or of its derivative by Omega, into z (.,)."""
+    by = factors(frequency, order)
+    for i in range(len(z)):
+        z[i] = by[0] * entries[0, i] + by[1] * entries[1, i] + by[2] * entries[2, i] + by[3] * entries[3, i]
+
+
+@kernel(fastmath={"contract"})
+def _beside(z, diagonal, left, right, across, along):
+    """The transpose of `Z_qz - left^T Z_zz` into across (s, m), or nothing if that has no columns, and `Z_zq - Z_zz
+    right` into along (s, m + l).
+    """
+    (s, columns), m = right.shape, left.shape[1]
+    coupling = m * columns
+    back = coupling + m * s
+    inner = back + s * columns
+    for k in range(s):
+        for j in range(columns):
+            along[k, j] = z[back + k * columns + j]
+        for i in range(across.shape[1]):
+            across[k, i] = z[coupling + i * s + k]
+        for l in range(k if diagonal else 0, k + 1 if diagonal else s):
+            own, turned = (z[inner + k], z[inner + k]) if diagonal else (z[inner + k * s + l], z[inner + l * s + k])
+            for j in range(columns):
+                along[k, j] -= own * right[l, j]
+            for i in range(across.shape[1]):
+                across[k, i] -= turned * left[l, i]
+
+
+@kernel(fastmath={"contract"})
+def between(entries, diagonal, frequency, order, left, right, out):
+    """See `Stack.between`."""
+    (s, columns), m = right.shape[1:], left.shape[2]
+    z, along = np.empty(entries.shape[1], dtype=np.complex128), np.empty((s, columns), dtype=np.complex128)
+    across = along[:, :0]
+    for f in range(frequency.shape[0]):
+        _dynamic(entries, frequency[f], order, z)
+        _beside(z, diagonal, left[f], right[f], across, along)
+        for i in range(m):
+            for j in range(columns):
+                out[f, i, j] = z[i * columns + j]
+        for k in range(s):
+            for i in range(m):
+                for j in range(columns):
+                    out[f, i, j] -= z[m * columns + i * s + k] * right[f, k, j] + left[f, k, i] * along[k, j]
+
 
 @kernel(fastmath={"contract"}, error_model="numpy")
 def eliminated(entries, diagonal, frequency, right, left, out):
-    """See `Stack`, `Stack.eliminated`."""
+    """See `Stack.eliminated`."""
     (s, columns), m = right.shape[1:], left.shape[2]
-    across = m * columns
-    back = across + m * s
+    coupling = m * columns
+    back = coupling + m * s
     inner = back + s * columns
     z = np.empty(entries.shape[1], dtype=np.complex128)
     for f in range(frequency.shape[0]):
-        by = factors(frequency[f], 0)
-        for i in range(len(z)):
-            z[i] = by[0] * entries[0, i] + by[1] * entries[1, i] + by[2] * entries[2, i] + by[3] * entries[3, i]
+        _dynamic(entries, frequency[f], 0, z)
         if diagonal:
             for k in range(s):
                 flexible = 1.0 / z[inner + k]
                 for j in range(columns):
                     right[f, k, j] = flexible * z[back + k * columns + j]
                 for i in range(m):
-                    left[f, k, i] = flexible * z[across + i * s + k]
+                    left[f, k, i] = flexible * z[coupling + i * s + k]
         else:
-            held, coupling = z[inner:].reshape(s, s), z[across:back].reshape(m, s)
+            held = z[inner:].reshape(s, s)
             right[f] = np.linalg.solve(held, z[back:inner].reshape(s, columns))
-            left[f] = np.linalg.solve(held.T, coupling.T)
+            left[f] = np.linalg.solve(held.T, z[coupling:back].reshape(m, s).T)
         for i in range(m):
             for j in range(columns):
                 out[f, i, j] = z[i * columns + j]
-        for i in range(m):
             for k in range(s):
                 for j in range(columns):
-                    out[f, i, j] -= z[across + i * s + k] * right[f, k, j]
+                    out[f, i, j] -= z[coupling + i * s + k] * right[f, k, j]
 
 
-@kernel(fastmath={"contract"})
-def between(entries, diagonal, frequency, order, left, right, out):
-    """See `Stack`, `Stack.between`."""
+@kernel(fastmath={"contract"}, error_model="numpy")
+def answered(entries, diagonal, frequency, a, a_diagonal, a_order, b, b_diagonal, b_order, left, right, out):
+    """See `Stack.answered`."""
     (s, columns), m = right.shape[1:], left.shape[2]
-    across = m * columns
-    back = across + m * s
-    inner = back + s * columns
-    z, moved = np.empty(entries.shape[1], dtype=np.complex128), np.empty(columns, dtype=np.complex128)
+    inner = m * columns + m * s + s * columns
+    z, by_a = np.empty(entries.shape[1], dtype=np.complex128), np.empty(a.shape[1], dtype=np.complex128)
+    by_b = np.empty(b.shape[1], dtype=np.complex128)
+    across, along = np.empty((2, s, m), dtype=np.complex128), np.empty((2, s, columns), dtype=np.complex128)
     for f in range(frequency.shape[0]):
-        by = factors(frequency[f], order)
-        for i in range(len(z)):
-            z[i] = by[0] * entries[0, i] + by[1] * entries[1, i] + by[2] * entries[2, i] + by[3] * entries[3, i]
+        _dynamic(entries, frequency[f], 0, z)
+        _dynamic(a, frequency[f], a_order, by_a)
+        _dynamic(b, frequency[f], b_order, by_b)
+        _beside(by_a, a_diagonal, left[f], right[f], across[0], along[1])
+        _beside(by_b, b_diagonal, left[f], right[f], across[1], along[0])
+        if diagonal:
+            for k in range(s):
+                for side in range(2):
+                    for j in range(columns):
+                        along[side, k, j] /= z[inner + k]
+        else:
+            held = z[inner:].reshape(s, s)
+            along[0], along[1] = np.linalg.solve(held, along[0]), np.linalg.solve(held, along[1])
         for i in range(m):
             for j in range(columns):
-                out[f, i, j] = z[i * columns + j]
-        for k in range(s):
-            for j in range(columns):
-                moved[j] = z[back + k * columns + j]
-            for l in range(k if diagonal else 0, k + 1 if diagonal else s):
-                own = z[inner + k] if diagonal else z[inner + k * s + l]
-                for j in range(columns):
-                    moved[j] -= own * right[f, l, j]
-            for i in range(m):
-                for j in range(columns):
-                    out[f, i, j] -= z[across + i * s + k] * right[f, k, j] + left[f, k, i] * moved[j]
-
-
-def _transposed(matrices: ComplexArray) -> ComplexArray:
-    return matrices.transpose(0, 2, 1)
+                out[f, i, j] = 0.0
+            for side in range(2):
+                for k in range(s):
+                    for j in range(columns):
+                        out[f, i, j] += across[side, k, i] * along[side, k, j]
 
 
 class Coordinates(NamedTuple):
@@ -377,25 +396,11 @@ class Condensed:
             result = total.between(frequency, sum(order for _, order in by), left, right)
         if len(by) < 2:
             return result
-        sides = {one: self._sides(frequency, *one) for one in by}
-        a, b = (sides[one] for one in by)
+        a, b = (self._stack(names) for names, _ in by)
         if a is None or b is None:
             return result
-        whole = self._own.at(frequency, 0)
-        moved: ComplexArray = _transposed(a[0]) @ whole.solved(b[1])
-        moved += moved if a is b else _transposed(b[0]) @ whole.solved(a[1])
-        return -moved if result is None else result - moved
-
-    def _sides(
-        self, frequency: NDArray[Any], names: tuple[str, ...], order: int
-    ) -> tuple[ComplexArray, ComplexArray] | None:
-        """`(Z_qz - left^T Z_zz)^T` and `Z_zq - Z_zz right` of Z differentiated; None for zero."""
-        right, left, _ = self._eliminated(frequency)
-        stack = self._stack(names)
-        if stack is None:
-            return None
-        change = stack.at(frequency, order)
-        return change.across(left), change.zq - change.inner(right)
+        answer = self._own.answered(frequency, a, b, (by[0][1], by[1][1]), left, right)
+        return -answer if result is None else result - answer
 
     def fed(self, rate: float) -> Condensed:
         """See `LinearPart.fed`; the coordinates are those of this part."""

@@ -92,7 +92,10 @@ class FreePhaseEquations(SingularEquations):
         own = super().rows
         if isinstance(self.family, ModeEquations):
             own = np.insert(own, self.state.balance.dimension, 0.0, axis=1)
-            own[:, -1 - len(self.names) :] += self.family.through_zeta(self._by_zeta, self.names)
+            first, by_zeta = own.shape[1] - len(self.names), self._by_zeta(self.state)
+            own[:, first - 1] += by_zeta
+            for i, slope in self.family.through_zeta(by_zeta, self._by_zeta, self.names):
+                own[:, first + i] += slope
         return np.concatenate((self.family.beside(self.of.extras), own))
 
     def _by_zeta(self, state: BalanceState) -> Array:

@@ -12,7 +12,7 @@ extended periodic motion concept (Krack, Nonlinear modal analysis of nonconserva
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -81,21 +81,22 @@ class ModeEquations(CycleEquations):
 
     def jacobian(self, names: tuple[str, ...]) -> Array:
         out, n = super().jacobian(names), self.state.balance.dimension
-        out[:n, n + 1 :] += self.through_zeta(_by_zeta, names)[:, 1:]
+        for i, slope in self.through_zeta(self.column, _by_zeta, names):
+            out[:n, n + 1 + i] += slope
         return out
 
-    def through_zeta(self, by_zeta: Callable[[BalanceState], Array], names: tuple[str, ...]) -> Array:
-        """What the forces of zeta do to the derivatives of R, or of a form, by zeta and the free parameters: a column
-        each, (m, 1 + number of names); `by_zeta` is that by zeta at a motion, (m,).
+    def through_zeta(
+        self, own: Array, by_zeta: Callable[[BalanceState], Array], names: tuple[str, ...]
+    ) -> Iterator[tuple[int, Array]]:
+        """What the forces of zeta do to the derivatives of R, or of a form, by the free parameters: which of names, and
+        a column (m,); `by_zeta` is the derivative by zeta at a motion, (m,), `own` at this one.
 
         omega, the first of names, is a factor of these forces, and parameters may change the masses.
         """
-        own = by_zeta(self.state)
-        columns = [own, self.zeta / self.state.omega * own]
-        for name in names[1:]:
-            moves = bool(self.zeta) and name in self.state.balance.system.mass.names
-            columns.append(self.zeta * self._slope(by_zeta, name) if moves else np.zeros_like(own))
-        return np.stack(columns, axis=1)
+        yield 0, self.zeta / self.state.omega * own
+        for i, name in enumerate(names[1:], 1):
+            if self.zeta and name in self.state.balance.system.mass.names:
+                yield i, self.zeta * self._slope(by_zeta, name)
 
     def _slope(self, function: Callable[[BalanceState], Array], name: str) -> Array:
         """The derivative of a function of the motion by a parameter: a central difference."""

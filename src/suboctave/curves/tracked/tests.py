@@ -31,7 +31,7 @@ import numpy as np
 
 from suboctave.bifurcation.bordered import NullVectors, bordered, null_vectors, transversality
 from suboctave.bifurcation.measures import crossing_pair
-from suboctave.continuation.linear import length
+from suboctave.continuation.linear import Factor, length
 from suboctave.continuation.point import crossing_matrix
 from suboctave.curves.kinds.branch_point import BranchPointUnfolded
 from suboctave.curves.kinds.free_phase import FreePhaseOperator
@@ -245,8 +245,8 @@ class CurvesCross(CurveTest):
         matrix[n] /= length(matrix[n]) or 1.0
         matrix[-1] -= (matrix[-1] @ matrix[n]) * matrix[n]
         matrix[-1] /= length(matrix[-1]) or 1.0
-        sign, size = np.linalg.slogdet(matrix)
-        return float(sign), float(size)
+        factor = Factor.of(matrix, overwrite=True)
+        return factor.sign, factor.log_determinant
 
     def smooth(self, sample: Sample) -> tuple[float, float]:
         if isinstance(sample.curve.augmentation, NonlinearMode) or stands(sample, sample.curve.name):
