@@ -28,15 +28,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
-from suboctave.compiled import kernel
 from suboctave.errors import ConvergenceError, InputError, shortened
 from suboctave.harmonic.basis import Array, ComplexArray
+from suboctave.harmonic.elimination import Stack
 from suboctave.harmonic.linear_part import (
     LinearPart,
     StructuralMatrices,
     damping_words,
     differentiated,
-    factors,
     fed_matrices,
     feeding_matrices,
     in_words,
@@ -51,171 +50,10 @@ from suboctave.model.system import System
 
 #: part of a direction that others do not hold, relative, below which it depends on them
 _DEPENDENT = 1e-9
-#: entries of a matrix relative to its diagonal that are rounding
-_ROUNDING, _BESIDE = 1e-12, 1e-9
 #: growth of the highest frequency that a basis is made for, when motions go beyond it
 _BEYOND = 1.5
 #: and beyond which it is no motion of interest: adaptive harmonics go from 15 to 127, and a range may be left
 _TOO_FAR = 20.0
-
-
-class Stack(NamedTuple):
-    """M, C, K, S in the coordinates (q, z) with loads' columns, all entries in a row, (4, .); how many q, z and columns
-    with those of q; if zz is a diagonal.
-    """
-
-    entries: Array
-    sizes: tuple[int, int, int]
-    diagonal: bool
-
-    @classmethod
-    def of(cls, parts: Sequence[tuple[Array, ...]]) -> Stack:
-        """From qq, qz, zq, zz of each."""
-        diagonal = all(_is_diagonal(part[3]) for part in parts)
-        if diagonal:
-            parts = [(*part[:3], part[3].diagonal()) for part in parts]
-        rows = [np.concatenate([one.ravel() for one in part]) for part in parts]
-        return cls(np.array(rows), (*parts[0][1].shape, parts[0][0].shape[1]), diagonal)
-
-    def between(self, frequency: NDArray[Any], order: int, left: ComplexArray, right: ComplexArray) -> ComplexArray:
-        """`[1 -left^T] Z [1; -right]` of the dynamic stiffness Z, differentiated by Omega, at frequencies, (F, m, m +
-        l); left (F, s, m), right (F, s, m + l).
-        """
-        out = np.empty((len(frequency), self.sizes[0], self.sizes[2]), dtype=complex)
-        between(self.entries, self.diagonal, frequency.astype(complex), order, left, right, out)
-        return out
-
-    def eliminated(self, frequency: NDArray[Any]) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-        """`Z_zz^-1 Z_zq` (F, s, m + l) at frequencies, the transpose of `Z_qz Z_zz^-1` (F, s, m), and what is left of Z
-        at q, (F, m, m + l).
-        """
-        (m, s, columns), count = self.sizes, len(frequency)
-        right, left = np.empty((count, s, columns), dtype=complex), np.empty((count, s, m), dtype=complex)
-        out = np.empty((count, m, columns), dtype=complex)
-        eliminated(self.entries, self.diagonal, frequency.astype(complex), right, left, out)
-        return right, left, out
-
-    def answered(
-        self, frequency: NDArray[Any], a: Stack, b: Stack, orders: tuple[int, int], left: ComplexArray,
-        right: ComplexArray,
-    ) -> ComplexArray:  # fmt: skip
-        """What the eliminated coordinates make of two changes of Z, those of a and b, differentiated by Omega:
-        `(a_qz - left^T a_zz) Z_zz^-1 (b_zq - b_zz right)`, and the same with a and b exchanged, (F, m, m + l).
-        """
-        out = np.empty((len(frequency), self.sizes[0], self.sizes[2]), dtype=complex)
-        answered(
-            self.entries, self.diagonal, frequency.astype(complex), a.entries, a.diagonal, orders[0], b.entries,
-            b.diagonal, orders[1], left, right, out,
-        )  # fmt: skip
-        return out
-
-
-@kernel(fastmath={"contract"})
-def _dynamic(entries, frequency, order, z):
-    """All entries of Z, or of its derivative by Omega, into z (.,)."""
-    by = factors(frequency, order)
-    for i in range(len(z)):
-        z[i] = by[0] * entries[0, i] + by[1] * entries[1, i] + by[2] * entries[2, i] + by[3] * entries[3, i]
-
-
-@kernel(fastmath={"contract"})
-def _beside(z, diagonal, left, right, across, along):
-    """The transpose of `Z_qz - left^T Z_zz` into across (s, m), or nothing if that has no columns, and `Z_zq - Z_zz
-    right` into along (s, m + l).
-    """
-    (s, columns), m = right.shape, left.shape[1]
-    coupling = m * columns
-    back = coupling + m * s
-    inner = back + s * columns
-    for k in range(s):
-        for j in range(columns):
-            along[k, j] = z[back + k * columns + j]
-        for i in range(across.shape[1]):
-            across[k, i] = z[coupling + i * s + k]
-        for l in range(k if diagonal else 0, k + 1 if diagonal else s):
-            own, turned = (z[inner + k], z[inner + k]) if diagonal else (z[inner + k * s + l], z[inner + l * s + k])
-            for j in range(columns):
-                along[k, j] -= own * right[l, j]
-            for i in range(across.shape[1]):
-                across[k, i] -= turned * left[l, i]
-
-
-@kernel(fastmath={"contract"})
-def between(entries, diagonal, frequency, order, left, right, out):
-    """See `Stack.between`."""
-    (s, columns), m = right.shape[1:], left.shape[2]
-    z, along = np.empty(entries.shape[1], dtype=np.complex128), np.empty((s, columns), dtype=np.complex128)
-    across = along[:, :0]
-    for f in range(frequency.shape[0]):
-        _dynamic(entries, frequency[f], order, z)
-        _beside(z, diagonal, left[f], right[f], across, along)
-        for i in range(m):
-            for j in range(columns):
-                out[f, i, j] = z[i * columns + j]
-        for k in range(s):
-            for i in range(m):
-                for j in range(columns):
-                    out[f, i, j] -= z[m * columns + i * s + k] * right[f, k, j] + left[f, k, i] * along[k, j]
-
-
-@kernel(fastmath={"contract"}, error_model="numpy")
-def eliminated(entries, diagonal, frequency, right, left, out):
-    """See `Stack.eliminated`."""
-    (s, columns), m = right.shape[1:], left.shape[2]
-    coupling = m * columns
-    back = coupling + m * s
-    inner = back + s * columns
-    z = np.empty(entries.shape[1], dtype=np.complex128)
-    for f in range(frequency.shape[0]):
-        _dynamic(entries, frequency[f], 0, z)
-        if diagonal:
-            for k in range(s):
-                flexible = 1.0 / z[inner + k]
-                for j in range(columns):
-                    right[f, k, j] = flexible * z[back + k * columns + j]
-                for i in range(m):
-                    left[f, k, i] = flexible * z[coupling + i * s + k]
-        else:
-            held = z[inner:].reshape(s, s)
-            right[f] = np.linalg.solve(held, z[back:inner].reshape(s, columns))
-            left[f] = np.linalg.solve(held.T, z[coupling:back].reshape(m, s).T)
-        for i in range(m):
-            for j in range(columns):
-                out[f, i, j] = z[i * columns + j]
-            for k in range(s):
-                for j in range(columns):
-                    out[f, i, j] -= z[coupling + i * s + k] * right[f, k, j]
-
-
-@kernel(fastmath={"contract"}, error_model="numpy")
-def answered(entries, diagonal, frequency, a, a_diagonal, a_order, b, b_diagonal, b_order, left, right, out):
-    """See `Stack.answered`."""
-    (s, columns), m = right.shape[1:], left.shape[2]
-    inner = m * columns + m * s + s * columns
-    z, by_a = np.empty(entries.shape[1], dtype=np.complex128), np.empty(a.shape[1], dtype=np.complex128)
-    by_b = np.empty(b.shape[1], dtype=np.complex128)
-    across, along = np.empty((2, s, m), dtype=np.complex128), np.empty((2, s, columns), dtype=np.complex128)
-    for f in range(frequency.shape[0]):
-        _dynamic(entries, frequency[f], 0, z)
-        _dynamic(a, frequency[f], a_order, by_a)
-        _dynamic(b, frequency[f], b_order, by_b)
-        _beside(by_a, a_diagonal, left[f], right[f], across[0], along[1])
-        _beside(by_b, b_diagonal, left[f], right[f], across[1], along[0])
-        if diagonal:
-            for k in range(s):
-                for side in range(2):
-                    for j in range(columns):
-                        along[side, k, j] /= z[inner + k]
-        else:
-            held = z[inner:].reshape(s, s)
-            along[0], along[1] = np.linalg.solve(held, along[0]), np.linalg.solve(held, along[1])
-        for i in range(m):
-            for j in range(columns):
-                out[f, i, j] = 0.0
-            for side in range(2):
-                for k in range(s):
-                    for j in range(columns):
-                        out[f, i, j] += across[side, k, i] * along[side, k, j]
 
 
 class Coordinates(NamedTuple):
@@ -496,12 +334,6 @@ class Condensed:
         inner = (self._eliminated(frequency)[0] @ columns[:, :, None])[:, :, 0]
         result: ComplexArray = amplitudes @ static.T - inner @ free.T
         return result
-
-
-def _is_diagonal(matrix: Array) -> bool:
-    size = np.sqrt(np.abs(np.multiply.outer(matrix.diagonal(), matrix.diagonal())))
-    beside = np.abs(matrix - np.diag(matrix.diagonal()))
-    return bool(np.all(beside <= _BESIDE * np.maximum(size, np.abs(matrix).max() * _ROUNDING)))
 
 
 # ------------------------------------------------------------------------------------------------------- which form
