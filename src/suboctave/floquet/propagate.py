@@ -26,44 +26,13 @@ import numpy as np
 
 from suboctave.compiled import kernel
 from suboctave.floquet.time_mesh import HIGHEST, ORDER
+from suboctave.harmonic.elimination import eliminate
 
 #: sums may be reordered; infinities keep their meaning
 _FAST = {"reassoc", "contract", "nsz"}
 #: relative errors of the entries of a monodromy matrix by rounding
 _ROUNDING = 1e-15
 _TINY = float(np.finfo(float).tiny)
-
-
-@kernel(fastmath=_FAST, error_model="numpy")
-def eliminate(a, b, n):
-    """Solve `a x = b`, n equations, for the columns of b, in place, by Gauss's elimination with pivots; zeros cost
-    nothing.
-    """
-    columns = b.shape[1]
-    for k in range(n):
-        best = k
-        for i in range(k + 1, n):
-            if abs(a[i, k]) > abs(a[best, k]):
-                best = i
-        if best != k:
-            for j in range(k, n):
-                a[k, j], a[best, j] = a[best, j], a[k, j]
-            for j in range(columns):
-                b[k, j], b[best, j] = b[best, j], b[k, j]
-        for i in range(k + 1, n):
-            if a[i, k] != 0.0:
-                f = a[i, k] / a[k, k]
-                for j in range(k + 1, n):
-                    a[i, j] -= f * a[k, j]
-                for j in range(columns):
-                    b[i, j] -= f * b[k, j]
-    for i in range(n - 1, -1, -1):
-        for k in range(i + 1, n):
-            if a[i, k] != 0.0:
-                for j in range(columns):
-                    b[i, j] -= a[i, k] * b[k, j]
-        for j in range(columns):
-            b[i, j] /= a[i, i]
 
 
 @kernel(fastmath=_FAST, error_model="numpy")

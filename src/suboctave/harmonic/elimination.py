@@ -20,6 +20,8 @@ from suboctave.compiled import kernel
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.linear_part import factors
 
+#: sums may be reordered; infinities keep their meaning
+_FAST = {"reassoc", "contract", "nsz"}
 #: entries of a matrix relative to its diagonal that are rounding
 _ROUNDING, _BESIDE = 1e-12, 1e-9
 
@@ -73,6 +75,38 @@ class Stack(NamedTuple):
             b.diagonal, orders[1], left, right, out,
         )  # fmt: skip
         return out
+
+
+@kernel(fastmath=_FAST, error_model="numpy")
+def eliminate(a, b, n):
+    """Solve `a x = b`, n equations, for the columns of b, in place, by Gauss's elimination with pivots; zeros cost
+    nothing.
+    """
+    columns = b.shape[1]
+    for k in range(n):
+        best = k
+        for i in range(k + 1, n):
+            if abs(a[i, k]) > abs(a[best, k]):
+                best = i
+        if best != k:
+            for j in range(k, n):
+                a[k, j], a[best, j] = a[best, j], a[k, j]
+            for j in range(columns):
+                b[k, j], b[best, j] = b[best, j], b[k, j]
+        for i in range(k + 1, n):
+            if a[i, k] != 0.0:
+                f = a[i, k] / a[k, k]
+                for j in range(k + 1, n):
+                    a[i, j] -= f * a[k, j]
+                for j in range(columns):
+                    b[i, j] -= f * b[k, j]
+    for i in range(n - 1, -1, -1):
+        for k in range(i + 1, n):
+            if a[i, k] != 0.0:
+                for j in range(columns):
+                    b[i, j] -= a[i, k] * b[k, j]
+        for j in range(columns):
+            b[i, j] /= a[i, i]
 
 
 @kernel(fastmath={"contract"})
@@ -141,9 +175,13 @@ def eliminated(entries, diagonal, frequency, right, left, out):
                 for i in range(m):
                     left[f, k, i] = flexible * z[coupling + i * s + k]
         else:
-            held = z[inner:].reshape(s, s)
-            right[f] = np.linalg.solve(held, z[back:inner].reshape(s, columns))
-            left[f] = np.linalg.solve(held.T, z[coupling:back].reshape(m, s).T)
+            for k in range(s):
+                for j in range(columns):
+                    right[f, k, j] = z[back + k * columns + j]
+                for i in range(m):
+                    left[f, k, i] = z[coupling + i * s + k]
+            eliminate(z[inner:].reshape(s, s).copy(), right[f], s)
+            eliminate(z[inner:].reshape(s, s).T.copy(), left[f], s)
         for i in range(m):
             for j in range(columns):
                 out[f, i, j] = z[i * columns + j]
@@ -172,8 +210,8 @@ def answered(entries, diagonal, frequency, a, a_diagonal, a_order, b, b_diagonal
                     for j in range(columns):
                         along[side, k, j] /= z[inner + k]
         else:
-            held = z[inner:].reshape(s, s)
-            along[0], along[1] = np.linalg.solve(held, along[0]), np.linalg.solve(held, along[1])
+            for side in range(2):
+                eliminate(z[inner:].reshape(s, s).copy(), along[side], s)
         for i in range(m):
             for j in range(columns):
                 out[f, i, j] = 0.0
