@@ -81,6 +81,44 @@ def test_what_was_not_foretold_is_not_believed():
     assert doubtful(at[:4], (0.2 + kink)[:4], 1) is None
 
 
+def test_a_third_difference_that_is_small_by_chance_is_not_believed():
+    """The third derivative of a quartic vanishes on the way: the parabola through the last places before an interval
+    then meets its far end, and says nothing of the inside.
+    """
+    at = np.array([-0.117, -0.0588, -0.0235, -0.0094, 0.0, 0.0588])
+
+    def quartic(s):
+        return 450.0 * (s - 0.0111) ** 2 + 2600.0 * (s + 0.0588) * s * (s + 0.0235) * (s - 0.0588) - 0.001
+
+    assert quartic(0.0) > 0.0 > quartic(0.0111)
+    assert doubtful(at, quartic(at), 4) is not None
+
+
+def turning_pair(me):
+    """A plate on unequal springs, coupled skew-symmetrically, under a rotating unbalance: one after the other a pair of
+    multipliers meets at -1, one of the two real ones passes it and comes back, and they part again.
+    """
+    force = "0.3*{0}*(x**2+y**2) + 0.1*(x**2+y**2)*{0}'"
+    return so.System(
+        np.eye(2), 0.1 * np.eye(2), [["1", "kx"], ["-kx", "1.1"]],
+        [so.Expression(dof, force.format(name), inputs={"x": 0, "y": 1}) for dof, name in enumerate("xy")],
+        [so.RotatingUnbalance(0, me, perpendicular=1), so.StaticLoad(1, -0.1)], {"kx": 0.13},
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("me", [0.15, *slow(0.14, 0.16)])
+@pytest.mark.parametrize("omega", [(3.0, 0.3), (2.9, 1.2)])
+def test_a_pair_that_meets_at_minus_one(me, omega):
+    found, finer = (
+        so.frequency_response(turning_pair(me), omega, max_step=step).bifurcations["PD"] for step in (None, 0.03)
+    )
+    assert len(found) == len(finer) == 2
+    for here, there in zip(found, finer, strict=True):
+        assert here.omega == pytest.approx(there.omega, abs=1e-7)
+        shot = shoot(turning_pair(me), here.orbit.start(), here.omega)
+        assert abs(shot.multipliers + 1.0).min() < 1e-4
+
+
 def test_scale_and_sign_do_not_matter():
     rng = np.random.default_rng(3)
     for _ in range(200):

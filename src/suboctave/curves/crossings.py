@@ -6,7 +6,8 @@ two places before it, and the one through q and the two places behind it, part f
 
     E(s) = |f[l2, l1, p, q]| (s - p) (s - l1) (s - l2)    and    |f[p, q, r1, r2]| (q - s) (r1 - s) (r2 - s)
 
-(divided differences). A smooth function that the places resolve has small ones; behind a kink, or where the places are
+(divided differences). A third difference may be small by chance, where the third derivative changes its sign: that of
+the places before, |f[l3, l2, l1, p]|, or behind, |f[q, r1, r2, r3]|, counts where it is larger. A smooth function that the places resolve has small ones; behind a kink, or where the places are
 too far apart, the foretelling fails at the far end by as much as the function may have strayed unseen. No zero hides
 between p and q if Q keeps its sign beyond SAFETY times the larger of the two; between places of opposite sign there is
 one zero only, if this holds on both sides of that of Q, and its slope there leaves no doubt either. Where there is but
@@ -41,7 +42,7 @@ def first_doubtful(
     """The first of several functions of which a zero may hide between `places[at]` and `places[at + 1]`, and where, as
     a fraction of the interval, not too close to its ends, so that both parts shrink; None if none is in doubt.
 
-    Three to six different places ascend, up to two on either side of the interval; `tests` has at every place the
+    Three to eight different places ascend, up to three on either side of the interval; `tests` has at every place the
     functions' signs and logarithms of moduli, (2, m). The side of an exact zero is the caller's business. `others`
     gives for the function k in doubt, in several ways, functions (N, 2, m') with together the same zeros: where none of
     them is in doubt in one of these ways, and no two have a zero, so is k.
@@ -59,6 +60,16 @@ def _settled(places: Array, functions: Array, at: int) -> bool:
     """Whether none of the functions is in doubt, and one at most has a zero."""
     zeros = int(np.count_nonzero(functions[at, 0] != functions[at + 1, 0]))
     return zeros <= 1 and bool(_first_doubtful(places, functions, at, 0)[1] < 0.0)
+
+
+@kernel()
+def _third(places, values, i):
+    """The modulus of f[x_i, x_i+1, x_i+2, x_i+3]."""
+    a, b, c, d = places[i], places[i + 1], places[i + 2], places[i + 3]
+    first = (values[i + 1] - values[i]) / (b - a)
+    middle = (values[i + 2] - values[i + 1]) / (c - b)
+    last = (values[i + 3] - values[i + 2]) / (d - c)
+    return abs(((last - middle) / (d - b) - (middle - first) / (c - a)) / (d - a))
 
 
 @kernel()
@@ -84,11 +95,15 @@ def _interpolated(places, tests, at, k, values):
     if left == 1:
         before = abs(second[at - 1])
     elif left > 1:
-        before = abs((second[at - 2] - second[at - 1]) / (places[at - 2] - places[at - 1]))
+        before = _third(places, values, at - 2)
     if right == 1:
         behind = abs(second[at + 2])
     elif right > 1:
-        behind = abs((second[at + 3] - second[at + 2]) / (places[at + 3] - places[at + 2]))
+        behind = _third(places, values, at)
+    if left > 2:
+        before = max(before, _third(places, values, at - 3))
+    if right > 2:
+        behind = max(behind, _third(places, values, at + 1))
     bent, third, shift, count = 0.0, 0.0, p, 0
     for i in (at - 1, at + 2, at - 2, at + 3):
         if 0 <= i < n:

@@ -44,6 +44,8 @@ FINEST = 1e-5
 MOST_PROBES = 60
 #: a step belongs to one curve if its interior lies within this share of its length from where its ends say
 _AWAY = 0.03
+#: samples on either side of an interval that tell what its inside may be
+_BESIDE = 3
 #: pairs of samples whose contacts are remembered, at least
 _REMEMBERED = 64
 #: intervals shorter than this are not cut because a contact grazes in them
@@ -81,7 +83,7 @@ class Steps:
     """
 
     #: samples behind a step that it is foretold from, the one that it begins with included
-    reach = 4
+    reach = 6
 
     def __init__(self) -> None:
         self._behind: list[Sample] = []
@@ -313,7 +315,7 @@ class Interior(ABC):
         return share, reason
 
     def _around(self, p: Sample, q: Sample) -> tuple[list[Sample], int]:
-        """The samples to interpolate through, up to two on either side, and the position of p among them.
+        """The samples to interpolate through, up to three on either side, and the position of p among them.
 
         They should be about as far apart as p and q: farther ones foretell nothing, and closer ones only rounding.
         """
@@ -331,14 +333,14 @@ class Interior(ABC):
         return [*left, p, q, *right], len(left)
 
     def _beside(self, start: int, way: int, h: float) -> tuple[list[Sample], Sample | None]:
-        """Up to two of the four samples beyond one, neither too close together nor too far for an interval of length
+        """Up to three of the four samples beyond one, neither too close together nor too far for an interval of length
         h, as far as the functions go on smoothly; and the first one beyond.
         """
         chosen: list[Sample] = []
         first: Sample | None = None
         samples, last = self.samples, 0.0
         here, end = samples[start], samples[start].place
-        for k in range(start + way, start + 5 * way, way):
+        for k in range(start + way, start + 7 * way, way):
             if not 0 <= k < len(samples):
                 break
             beyond = samples[k]
@@ -352,7 +354,7 @@ class Interior(ABC):
             if distance - last > 0.1 * h:
                 chosen.append(beyond)
                 last = distance
-                if len(chosen) == 2:
+                if len(chosen) == _BESIDE:
                     break
             here = beyond
         return chosen, first

@@ -23,7 +23,7 @@ from suboctave.floquet.symmetric import least_factor
 class StepWatch(Steps):
     """Looks at the steps of a curve in order, for the events that `tests` tell of."""
 
-    reach = 3
+    reach = 5
 
     def __init__(self, tests: tuple[CurveTest, ...], newton: NewtonOptions) -> None:
         super().__init__()
