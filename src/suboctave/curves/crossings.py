@@ -7,11 +7,12 @@ two places before it, and the one through q and the two places behind it, part f
     E(s) = |f[l2, l1, p, q]| (s - p) (s - l1) (s - l2)    and    |f[p, q, r1, r2]| (q - s) (r1 - s) (r2 - s)
 
 (divided differences). A third difference may be small by chance, where the third derivative changes its sign: that of
-the places before, |f[l3, l2, l1, p]|, or behind, |f[q, r1, r2, r3]|, counts where it is larger. A smooth function that the places resolve has small ones; behind a kink, or where the places are
-too far apart, the foretelling fails at the far end by as much as the function may have strayed unseen. No zero hides
-between p and q if Q keeps its sign beyond SAFETY times the larger of the two; between places of opposite sign there is
-one zero only, if this holds on both sides of that of Q, and its slope there leaves no doubt either. Where there is but
-one place beside, it serves with p and q as the second difference does above.
+the places before, |f[l3, l2, l1, p]|, or behind, |f[q, r1, r2, r3]|, counts where it is larger. A smooth function that
+the places resolve has small ones; behind a kink, or where the places are too far apart, the foretelling fails at the
+far end by as much as the function may have strayed unseen. No zero hides between p and q if Q keeps its sign beyond
+SAFETY times the larger of the two; between places of opposite sign there is one zero only, if this holds on both sides
+of that of Q, and its slope there leaves no doubt either. Where there is but one place beside, it serves with p and q as
+the second difference does above.
 
 A function that does something between p and q of which neither its values nor those before and after give a hint is
 beyond this (and any) test: that is what the length of the examined intervals is reported for.

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from suboctave.errors import InputError
 from suboctave.model.elements.base import Array, BaseElement, Dof, Element, Place, required
 from suboctave.model.elements.batch_form import BatchForm, WrittenForm
-from suboctave.model.elements.smoothness import Sampling
+from suboctave.model.elements.smoothness import Sampling, Surface
 from suboctave.model.elements.written import WrittenElement
 from suboctave.model.expressions.coefficients import Number
 from suboctave.model.expressions.reader import RESERVED
@@ -77,6 +77,14 @@ class CoupledElement(BaseElement):
     def coefficient_curvature(self, q: Array, theta: Array, c: Array) -> Array:
         """`f_cc`, (nc, nc, N)."""
 
+    def surface(self, which: int, q: Array, theta: Array, c: Array) -> Surface:
+        """The function number `which` at whose zeros the law has corners, for a law whose `sampling` tells of some."""
+        raise _without_surfaces(self)
+
+
+def _without_surfaces(element: BaseElement) -> InputError:
+    return InputError(f"{element.label}: sampling tells of corners at surfaces, so its class must define surface()")
+
 
 def _input_place(owner: str, given: Any) -> Place:
     is_vector = isinstance(given, np.ndarray) or (
@@ -124,6 +132,9 @@ class _OneInput:
     def coefficient_curvature(self, q: Array, theta: Array, c: Array) -> Array:
         return self.element.coefficient_curvature(*self._state(q), c)
 
+    def surface(self, which: int, q: Array, theta: Array, c: Array) -> Surface:
+        raise _without_surfaces(self.element)
+
 
 def _rows(u: Array, parts: Sequence[Array | None]) -> list[Array]:
     """Derivatives as arrays like u, those that are left out as zeros."""
@@ -163,9 +174,9 @@ class Expression(CoupledElement):
     forces that depend on several: `Expression(0, "k*x*y**2", inputs={"x": 0, "y": (1, 2)})`; then only those names are
     states, and their velocities are written with a prime.
 
-    Corners (`abs`, `max`, ..) at places that do not depend on other states are integrated exactly, and steps
-    `tanh(v/v0)` and `atan` of one velocity times polynomials however steep they are, others by as many samples as it
-    takes. A force that jumps is refused.
+    Corners (`abs`, `max`, ..) are integrated exactly, at places (`max(x-gap, 0)`), or where a smooth function of the
+    states and of time vanishes (`max(sqrt(x**2+y**2)-gap, 0)`), and steps `tanh(v/v0)` and `atan` of one velocity times
+    polynomials however steep they are, others by as many samples as it takes. A force that jumps is refused.
     """
 
     def __init__(
@@ -225,3 +236,6 @@ class Expression(CoupledElement):
     third = _of_law("third")
     coefficient_tangent = _of_law("coefficient_tangent")
     coefficient_curvature = _of_law("coefficient_curvature")
+
+    def surface(self, which: int, q: Array, theta: Array, c: Array) -> Surface:
+        return self._law.surface(which, q, theta, c)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -166,13 +166,41 @@ class CornerSampling:
 
     Only its derivatives may jump there. It is integrated between the instants at which a motion reaches these places,
     with as many nodes as force and tangent need to settle. For elements with `own_nodes`; of a coupled element, the
-    places are those of its first input. `rough`: powers of a half begin at a corner (contact after Hertz).
+    places are those of its first input, and there may be corners where other functions of all that it reads vanish, so
+    many `surfaces`, of which the element tells by `surface` (`CoupledElement.surface`). `rough`: powers of a half begin
+    at a corner (contact after Hertz), of which none may be a surface.
     """
 
     points: tuple[float, ...] = ()
     velocities: tuple[float, ...] = ()
     rough: bool = False
+    surfaces: int = 0
     whole = False
+
+    def __post_init__(self) -> None:
+        if self.rough and self.surfaces:
+            raise InputError("powers of a half may begin at points and velocities, not at surfaces")
+
+
+class Surface(NamedTuple):
+    """A function of what a law reads, phi(q, theta; c), that vanishes where the law has a corner, at N states.
+
+    value
+        phi, (N,).
+    normal, bend
+        phi_q (Q, N) and phi_qq (Q, Q, N).
+    by_phase, normal_by_phase
+        phi_theta (N,) and phi_q theta (Q, N).
+    by_coefficients
+        phi_c, (nc, N).
+    """
+
+    value: Array
+    normal: Array
+    bend: Array
+    by_phase: Array
+    normal_by_phase: Array
+    by_coefficients: Array
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,7 @@ from suboctave.model.elements.smoothness import (
     PolynomialSampling,
     Sampling,
     SharpVelocitySampling,
+    Surface,
 )
 from suboctave.model.expressions.derivatives import (
     CORNER_FUNCTIONS,
@@ -103,9 +104,11 @@ class Law:
         self.corner_input = 0
         #: velocities and widths at which tanh and atan are singular, as expressions
         self._steps: list[tuple[Any, Any]] = []
-        self._degree, self._corner_places = self._smoothness()
         powers = [power for power in self.expression.atoms(sympy.Pow) if not power.exp.is_integer]
         self.rough = any(power.base.has(Ramp, Modulus, Step) for power in powers)
+        #: functions at whose zeros there are corners, where these are not places of the first input
+        self._surfaces: list[Any] = []
+        self._degree, self._corner_places = self._smoothness()
 
     def __reduce__(self) -> tuple[Any, ...]:  # compiled again on the other side
         return law_of, self._source
@@ -121,10 +124,12 @@ class Law:
             self._check_continuous(argument, place)
         known = [place for place in places if place is not None]
         inputs = {row % self.count for row, _ in known}
-        if len(known) < len(places) or len(inputs) > 1:
-            return None, None
-        self.corner_input = inputs.pop()
-        return None, known if self.corner_input == 0 else None
+        if len(known) == len(places) and len(inputs) == 1:
+            self.corner_input = inputs.pop()
+            return None, known if self.corner_input == 0 else None
+        if not self.rough and not any(argument.has(*CORNER_FUNCTIONS) for argument in arguments):
+            self._surfaces = arguments
+        return None, None
 
     def corners(self) -> list[Any]:
         """What vanishes where the force has corners, or jumps, that depend on the state."""
@@ -208,6 +213,8 @@ class Law:
             return SharpVelocitySampling(tuple(v for v, _ in there), tuple(w for _, w in there), self._degree or 0)
         if self._degree is not None:
             return PolynomialSampling(max(1, self._degree))
+        if self._surfaces:
+            return CornerSampling(surfaces=len(self._surfaces))
         if not self._corner_places:
             return AdaptiveSampling()
         rows, places = zip(*self._corner_places, strict=True)
@@ -272,6 +279,22 @@ class Law:
         )
         by_c = values(q, theta, c).reshape(len(self.c), 1 + len(self.q), -1)[self._ranks]
         return by_c[:, 0], by_c[:, 1:]
+
+    def surface(self, which: int, q: Array, theta: Array, c: Array) -> Surface:
+        """See `CoupledElement.surface`."""
+        phi, states, size = self._surfaces[which], self.q, len(self.q)
+
+        def parts() -> list[Any]:
+            normal = [phi.diff(a) for a in states]
+            bends = [a.diff(b) for a in normal for b in states]
+            by_phase = [one.diff(self.phase) for one in (phi, *normal)]
+            return [phi, *normal, *bends, *by_phase, *(phi.diff(a) for a in self.c)]
+
+        values = self._code(f"surface {which}", parts)(q, theta, c)
+        value, normal, bend, by_phase, normal_by_phase, by_c = np.split(
+            values, np.cumsum([1, size, size * size, 1, size])
+        )
+        return Surface(value[0], normal, bend.reshape(size, size, -1), by_phase[0], normal_by_phase, by_c)
 
     def coefficient_curvature(self, q: Array, theta: Array, c: Array) -> Array:
         """`f_cc`, (nc, nc, N)."""

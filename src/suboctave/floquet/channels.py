@@ -1,0 +1,242 @@
+"""The channels of laws that are asked at nodes, along a motion whose stability is looked for.
+
+Elements with nodes of their own have one channel for each of their inputs, behind those of the groups. Panels end just
+before and just behind every corner of a law: between such marks lies a slice of no length to speak of, into which goes
+what the corner adds as it is reached earlier or later. Channels without force make panels follow what a law follows: a
+velocity in which it is sharp, or the function that vanishes at a corner.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from suboctave.floquet.time_mesh import NODES, ORDER
+from suboctave.harmonic.aft.channel import Channel
+from suboctave.harmonic.aft.closed_form import NO_ROWS
+from suboctave.harmonic.aft.corners import Corner, surface_at
+from suboctave.harmonic.aft.general import GeneralLaw
+from suboctave.harmonic.aft.table import Probe
+from suboctave.harmonic.basis import Array, ComplexArray
+from suboctave.harmonic.evaluation import BalanceState
+
+#: nodes per period of a law of unknown smoothness, in units of panels of one radian; phase of a tangent over a panel
+BLIND, _TANGENT = 48.0, 7.0
+#: width of the slices that are cut out around corners, in units of the function that vanishes there
+_SLICE = 1e-9
+#: how close to a corner where powers of a half begin panels are graded, in units of the motion
+_ROUGH = 1e-6
+#: corrections of a state that has left its side of a corner
+_CORRECTED = 3
+_NOTHING = Probe()
+
+
+class _Marked(NamedTuple):
+    """Corners of a law that one channel has the marks of."""
+
+    channel: int
+    corners: list[Corner]
+
+
+class Channels:
+    """Laws that are asked at nodes, and the channels of elements with nodes of their own, after those of the groups.
+
+    Attributes
+    ----------
+    first
+        Number of groups.
+    motions, forces
+        Displacement and Fourier coefficients of the force of every channel of their own, lists of (H + 1,) and
+        (top + 1,).
+    numbers
+        The channel of every input of these elements.
+    probes
+        What panels follow along these channels.
+    degree, finest
+        Degree of the tangents as polynomials in the motion; longest panel that they allow.
+    unknown
+        Whether a law may be anything.
+    """
+
+    def __init__(self, state: BalanceState) -> None:
+        self.state, self.first = state, len(state.balance.groups)
+        self.motions: list[ComplexArray] = []
+        self.forces: list[ComplexArray] = []
+        self.numbers: list[int] = []
+        self.probes: list[Probe] = []
+        self.degree, self.finest, self.unknown = 0, math.inf, False
+        #: every law, the channel of its first input, and what its forces along every input are multiplied by
+        self._laws: list[tuple[GeneralLaw, int, Array]] = []
+        self._tangents: list[Array] = []
+        #: channels with marks of corners, by the first channel of their element; first and last panel between marks,
+        #: by channel
+        self._sliced: dict[int, list[_Marked]] = {}
+        self._slices: dict[int, list[tuple[int, int]]] = {}
+        self._clock = -1
+        if not state.packed.whole:
+            for g, channel in enumerate(state.channels[: self.first]):
+                own = [law for law in channel.laws if isinstance(law, GeneralLaw)]
+                self._laws += [(law, g, np.ones(1)) for law in own]
+        for channel in state.own_channels if state.balance.own else ():
+            self._add(channel)
+        if any(law.harmonic for law, _, _ in self._laws):
+            turning = np.zeros(state.basis.harmonics + 1, dtype=complex)
+            turning[1] = 1.0
+            self._clock = self._channel(turning)
+
+    def _channel(self, motion: ComplexArray, probe: Probe = _NOTHING) -> int:
+        self.motions.append(motion)
+        self.forces.append(np.zeros(self.state.balance.top + 1, dtype=complex))
+        self.probes.append(probe)
+        return self.first + len(self.motions) - 1
+
+    def _add(self, own: Channel) -> None:
+        (nodal,) = own.laws
+        assert isinstance(nodal, GeneralLaw)
+        along, law = nodal.along, nodal.smoothness
+        scale = np.ones(own.count)
+        begin = len(self.motions)
+        corners = nodal.corners
+        for i, (d, motion) in enumerate(zip(own.ins, along.motions, strict=True)):
+            if len(d) == 1:
+                # see `blocks.in_blocks`
+                scale[i] = own.out[0] / d[0]
+            places = [corner for corner in corners if i == 0 and corner.row == 0]
+            self.numbers.append(self._channel(motion, _probe(nodal, motion, places)))
+            self._mark(begin, self.numbers[-1], places)
+        self.forces[begin] = scale[0] * own.spectra[0]
+        self._laws.append((nodal, self.first + begin, scale))
+        velocity = nodal.velocity
+        for row, series in {corner.row: corner.series for corner in corners if corner.row}.items():
+            if series[1:].any():
+                places = [corner for corner in corners if corner.row == row]
+                self._mark(begin, self._channel(series, _probe(nodal, series, places)), places)
+        if law.sharp_velocities[0] and velocity.any():
+            self._channel(velocity, Probe(NO_ROWS, *law.sharp_velocities))
+        degree = max(1, law.degree - 1)
+        self.degree = max(self.degree, degree)
+        self.unknown = self.unknown or law.unknown
+        if law.cornered or law.unknown:
+            self.finest = min(self.finest, BLIND / nodal.samples)
+        if nodal.harmonic:
+            varying = nodal.harmonic * nodal.along.nu + degree * nodal.along.high
+            self.finest = min(self.finest, _TANGENT / varying)
+
+    def _mark(self, begin: int, channel: int, corners: list[Corner]) -> None:
+        if corners:
+            self._sliced.setdefault(self.first + begin, []).append(_Marked(channel, corners))
+
+    def beside(self, motions: ComplexArray) -> ComplexArray:
+        """Displacements (G, H + 1) with those of these channels behind them, as long as the longest."""
+        longest = max(motions.shape[1], *(len(one) for one in self.motions))
+        return np.array([np.pad(one, (0, longest - len(one))) for one in (*motions, *self.motions)])
+
+    def _state(self, nodal: GeneralLaw, begin: int, path: Array) -> tuple[Array, Array]:
+        """q (Q, N) and theta (N,) of an element at the nodes of the panels."""
+        q = _inputs(nodal, begin, path)
+        if self._clock < 0 or not nodal.harmonic:
+            return np.ascontiguousarray(q), np.zeros(q.shape[1])
+        cosine, slope = path[self._clock]
+        return np.ascontiguousarray(q), nodal.along.nu * np.arctan2(-slope / nodal.along.rate, cosine)
+
+    def evaluate(self, path: Array, law: Array) -> None:
+        """Add force, stiffness and damping along the path (G, 2, N) to `law` (G, >= 3, N)."""
+        self._tangents = []
+        for nodal, begin, scale in self._laws:
+            q, theta = self._state(nodal, begin, path)
+            force, f_q = nodal.tangent(q, theta)
+            law[begin, 0] += scale[0] * force
+            self._tangents.append(f_q)
+            self._put(nodal, begin, scale, f_q, law)
+
+    def _put(self, nodal: GeneralLaw, begin: int, scale: Array, f_q: Array, law: Array) -> None:
+        """Add a tangent (Q, N) to stiffness and damping in `law` (G, >= 3, N)."""
+        count = nodal.count
+        for i in range(count):
+            law[begin + i, 1] += scale[i] * f_q[i]
+            if nodal.moving:
+                law[begin + i, 2] += scale[i] * f_q[count + i]
+
+    def changed(self, path: Array, change: Array, law: Array, spans: Array) -> None:
+        """Add stiffness and damping along the path changed by `change` to `law` (G, 3, N).
+
+        Of laws with corners every node keeps its side. For the time by which the motion reaches a corner later the law
+        before it stays: an impulse, put into the slice that was cut out there.
+        """
+        for (nodal, begin, scale), f_q in zip(self._laws, self._tangents, strict=True):
+            q, theta = self._state(nodal, begin, path)
+            d = _inputs(nodal, begin, change)
+            if nodal.smoothness.sharp:
+                new = f_q + np.einsum("rsn,sn->rn", nodal.curvature(q, theta), d)
+            else:
+                new = nodal.tangent(_moved(nodal, q, theta, d), theta)[1]
+            self._put(nodal, begin, scale, new, law)
+            for marked in self._sliced.get(begin, ()):
+                for p, last in self._slices.get(marked.channel, ()):
+                    i, j = p * (ORDER - 1), (last + 1) * (ORDER - 1)
+                    here = surface_at(nodal, marked.corners[0], q[:, i : i + 1], theta[i : i + 1])
+                    normal, jumps = here.normal[:, 0], f_q[:, j] - f_q[:, i]
+                    # how fast the function that vanishes there passes
+                    rate = (
+                        path[marked.channel, 1, i] + normal[: nodal.count] @ change[begin : begin + nodal.count, 1, i]
+                    )
+                    if rate == 0.0 or not jumps.any():
+                        continue
+                    later, length = -(normal @ d[:, i]) / rate, 2.0 * spans[p, 0]
+                    impulses = np.multiply.outer(jumps, -1.5 * later / length * (1.0 - NODES**2))
+                    self._put(nodal, begin, scale, impulses, law[:, :, i : i + ORDER])
+
+    def locate(self, events: Array, start: np.ndarray, owner: np.ndarray, panels: int) -> None:
+        """Find the slices around corners: panels between the two marks of one corner.
+
+        events, start, owner: see `time_mesh.events_along` and `panels_between`; panels: how many there are.
+        """
+        if not self._sliced:
+            return
+        first = np.searchsorted(owner, np.arange(self.first + len(self.motions)))
+        pieces = events[:, 5].astype(int)
+        for i, piece in enumerate(pieces):
+            follow = (i + 1) % len(pieces)
+            if pieces[follow] < 0:  # a passage between the marks
+                follow = (follow + 1) % len(pieces)
+            if piece < 0 or owner[piece] < self.first or pieces[follow] < 0 or follow == i:
+                continue
+            channel = int(owner[piece])
+            own, other = piece - first[channel], pieces[follow] - first[channel]
+            apart = (events[follow, 0] - events[i, 0]) % (2.0 * math.pi)
+            if owner[pieces[follow]] == channel and own // 2 == other // 2 and own != other and 0.0 < apart < 1e-3:
+                last = int(start[follow]) - 1 if start[follow] > start[i] else panels - 1
+                self._slices.setdefault(channel, []).append((int(start[i]), last))
+
+
+def _inputs(nodal: GeneralLaw, begin: int, path: Array) -> Array:
+    """Displacements and, if a law reads them, velocities of its inputs, (Q, N), of all channels' (G, 2, N)."""
+    rows = path[begin : begin + nodal.count]
+    return np.concatenate((rows[:, 0], rows[:, 1])) if nodal.moving else rows[:, 0]
+
+
+def _moved(nodal: GeneralLaw, q: Array, theta: Array, d: Array) -> Array:
+    """The states `q + d`, which stay on their sides of all corners."""
+    moved, least = q + d, np.finfo(float).tiny
+    for corner in nodal.corners:
+        near = _SLICE * max(float(np.abs(corner.series).max()), least)
+        above = surface_at(nodal, corner, q, theta).value > 0.0
+        for _ in range(_CORRECTED if corner.row >= len(q) else 1):
+            surface = surface_at(nodal, corner, moved, theta)
+            wanted = np.where(above, np.maximum(surface.value, near), np.minimum(surface.value, -near))
+            length = np.maximum((surface.normal**2).sum(axis=0), least)
+            moved = moved + (wanted - surface.value) / length * surface.normal
+    return moved
+
+
+def _probe(law: GeneralLaw, motion: ComplexArray, corners: list[Corner]) -> Probe:
+    """Panels end where the motion crosses pieces without stiffness, just before and just after corners; towards rough
+    ones they are graded, as towards a law that is sharp there.
+    """
+    size = float(np.abs(motion).max())
+    near, levels = _SLICE * 2.0 * size, [corner.level for corner in corners]
+    pieces = [(0.0, level + side * near, 1.0) for level in levels for side in (-1.0, 1.0)]
+    rough = levels if law.rough else []
+    return Probe(np.array(pieces).reshape(-1, 3), rough, [_ROUGH * size] * len(rough))
