@@ -2,23 +2,33 @@
 contact that grazes.
 
 A gap is a place u = b at which an element's law has a corner (a piece of a piecewise-linear law), or is sharp (a point
-of `SharpSampling`). Elements that act along the same direction share one search for extrema.
+of `SharpSampling`), or a surface phi = 0 of all that the law reads (`harmonic.aft.corners`): phi is then the relative
+displacement, and its gap 0. Elements that act along the same direction share one search for extrema.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
+from suboctave.harmonic.aft.channel import Channel
 from suboctave.harmonic.aft.closed_form import corner_weights
+from suboctave.harmonic.aft.corners import Corner, gaps_of, rates_of_state, surface_at
+from suboctave.harmonic.aft.general import GeneralLaw
 from suboctave.harmonic.aft.law import LocalMotion
 from suboctave.harmonic.basis import Array
 from suboctave.harmonic.evaluation import BalanceState
-from suboctave.harmonic.trigonometric import extrema
+from suboctave.harmonic.quadrature import search_grid
+from suboctave.harmonic.trigonometric import extrema, motion
 from suboctave.model.elements.base import BaseElement, Element
 from suboctave.model.elements.coupled import CoupledElement, as_coupled, reads
 from suboctave.model.elements.smoothness import CornerSampling, PiecewiseLinear, levels as levels_of
+
+#: step in tau by which the rate of a surface's function, and of its derivatives by coefficients, is told
+_BESIDE = 1e-5
 
 
 @dataclass(eq=False, slots=True)
@@ -41,32 +51,49 @@ def gap_extrema(state: BalanceState) -> tuple[GapExtrema, ...]:
     """Every gap of every element on a motion."""
     grid = state.balance.grid
     gaps = []
-    for own, motion in zip(state.laws.levels, state.motions, strict=True):
+    for own, series in zip(state.laws.levels, state.motions, strict=True):
         if own:
-            turns = extrema(motion, *grid)
+            turns = extrema(series, *grid)
             gaps += [GapExtrema(element, place, level, *turns) for element, place, level in own]
     for channel in state.own_channels:
-        for _, member in channel.members():
-            places = levels_of(member.kind, member.coefficients)
-            if places:
+        for law, member in channel.members():
+            if isinstance(law, GeneralLaw) and isinstance(member.kind, CornerSampling):
+                gaps += _at_corners(law, member.number, gaps)
+            elif places := levels_of(member.kind, member.coefficients):
                 turns = extrema(channel.along.motion, *grid)
                 gaps += [GapExtrema(member.number, place, level, *turns) for place, level in enumerate(places)]
     return tuple(gaps)
 
 
+def _at_corners(law: GeneralLaw, element: int, known: list[GapExtrema]) -> list[GapExtrema]:
+    """The gaps of a law with corners, but for surfaces that another element has as well: a ring around a shaft."""
+    found: list[GapExtrema] = []
+    for index, corner in enumerate(gaps_of(law)):
+        turns, others = corner.turns, (*known, *found)
+        if not (corner.row and any(np.array_equal(turns[1], one.value) and not one.level for one in others)):
+            found.append(GapExtrema(element, index, corner.level, *turns))
+    return found
+
+
 def crossing_speeds(state: BalanceState) -> Array:
     """Moduli of du/dtau where a motion crosses the gaps of piecewise-linear laws."""
     packed, slownesses = state.packed, [np.zeros(0)]
-    for motion, first, last in zip(state.motions, packed.first, packed.first[1:], strict=False):
+    for series, first, last in zip(state.motions, packed.first, packed.first[1:], strict=False):
         # of unit stiffness, on the side above, so that the weight is the inverse speed
         unit = packed.pieces[first:last] * [0.0, 1.0, 0.0] + [1.0, 0.0, 1.0]
-        slownesses.append(corner_weights(motion, unit, *state.balance.grid)[2])
+        slownesses.append(corner_weights(series, unit, *state.balance.grid)[2])
     return 1.0 / np.concatenate(slownesses)
 
 
 def levels(local: LocalMotion) -> tuple[float, ...]:
     """Displacements at which an element's law has a corner, or is sharp."""
     return levels_of(local.kind, local.coefficients)
+
+
+def level_of(local: LocalMotion, index: int) -> float:
+    """The displacement of a gap, 0 of a surface."""
+    places = levels(local)
+    return places[index] if index < len(places) else 0.0
 
 
 def level_rate(state: BalanceState, element: int, index: int, name: str) -> float:
@@ -84,12 +111,95 @@ def level_rate(state: BalanceState, element: int, index: int, name: str) -> floa
     return float(by_coefficient[index] @ rates) if index < len(by_coefficient) else 0.0
 
 
+class Height(NamedTuple):
+    """How far a relative displacement lies above its gap at an instant, and how fast it and its rate by tau move.
+
+    height, slope, curve
+        u - gap, and its first two derivatives by tau.
+    by_x, slope_by_x
+        Derivatives of the first two by the coefficients, (2 H + 1, size).
+    by_names, slope_by_names
+        And by "omega" or parameters.
+    """
+
+    height: float
+    slope: float
+    curve: float
+    by_x: Array
+    slope_by_x: Array
+    by_names: Array
+    slope_by_names: Array
+
+
+def height_at(state: BalanceState, element: int, index: int, tau: float, names: Sequence[str] = ()) -> Height:
+    """The height of an element over one of its gaps at an instant."""
+    rows = basis_rows(state.basis.harmonics, tau)
+    if (surface := _surface_of(state, element, index)) is not None:
+        return _over_surface(state, element, *surface, tau, rows, names)
+    direction = read_direction(state, element)
+    u = state.x @ direction
+    height, slope, curve = (float(row @ u) for row in rows)
+    gap = np.array([-level_rate(state, element, index, name) for name in names])
+    by_x, slope_by_x = (np.multiply.outer(row, direction) for row in rows[:2])
+    height -= level_of(state.local(element), index)
+    return Height(height, slope, curve, by_x, slope_by_x, gap, np.zeros(len(names)))
+
+
+def _surface_of(state: BalanceState, element: int, index: int) -> tuple[Channel, GeneralLaw, Corner] | None:
+    """The channel, the law and the corner of a gap that is a surface, None if it is a displacement."""
+    for channel in state.own_channels:
+        for law, member in channel.members():
+            if member.number == element and isinstance(law, GeneralLaw) and isinstance(member.kind, CornerSampling):
+                corner = gaps_of(law)[index]
+                return (channel, law, corner) if corner.row else None
+    return None
+
+
+def _over_surface(
+    state: BalanceState, element: int, channel: Channel, law: GeneralLaw, corner: Corner, tau: float,
+    rows: tuple[Array, Array, Array], names: Sequence[str],
+) -> Height:  # fmt: skip
+    zr, zi = np.cos([tau]), np.sin([tau])
+    q, theta = law.state_at(zr, zi)
+    here, rates, nu = surface_at(law, corner, q, theta), rates_of_state(law, zr, zi)[:, 0], law.along.nu
+    normal = here.normal[:, 0]
+    turning = here.bend[:, :, 0] @ rates + nu * here.normal_by_phase[:, 0]
+    by_x, slope_by_x = np.zeros((2, len(rows[0]), channel.ins.shape[1]))
+    for r, direction in enumerate(channel.ins):
+        by_x += np.multiply.outer(normal[r] * rows[0], direction)
+        slope_by_x += np.multiply.outer(turning[r] * rows[0] + normal[r] * rows[1], direction)
+        if law.moving:
+            i, rate = r + law.count, law.along.rate
+            by_x += np.multiply.outer(rate * normal[i] * rows[1], direction)
+            slope_by_x += np.multiply.outer(rate * (turning[i] * rows[1] + normal[i] * rows[2]), direction)
+    local = state.local(element).element
+    moves = [np.zeros(len(law.c)) if n == "omega" else local.parameter_rates(state.values, {n: 1.0}) for n in names]
+    beside = []
+    for side in (_BESIDE, -_BESIDE):
+        at = np.cos([tau + side]), np.sin([tau + side])
+        there = surface_at(law, corner, *law.state_at(*at))
+        rate = there.normal[:, 0] @ rates_of_state(law, *at)[:, 0] + nu * there.by_phase[0]
+        beside.append(np.append(there.by_coefficients[:, 0], rate))
+    change = (beside[0] - beside[1]) / (2.0 * _BESIDE)
+    by_names = np.array([here.by_coefficients[:, 0] @ move for move in moves])
+    slope_by_names = np.array([change[:-1] @ move for move in moves])
+    if law.moving and "omega" in names:
+        # velocities are in proportion to it
+        k, fast = list(names).index("omega"), slice(law.count, None)
+        by_names[k] += normal[fast] @ q[fast, 0] / state.omega
+        slope_by_names[k] += (turning[fast] @ q[fast, 0] + normal[fast] @ rates[fast]) / state.omega
+    slope = float(normal @ rates + nu * here.by_phase[0])
+    return Height(float(here.value[0]), slope, float(change[-1]), by_x, slope_by_x, by_names, slope_by_names)
+
+
 def contact_side(local: LocalMotion, index: int) -> int:
     """+1 where the element is in contact above its gap, -1 below it: the side on which it is stiffer."""
     kind = local.kind
     if isinstance(kind, PiecewiseLinear):
         piece = kind.pieces[index]
         return piece.side if local.coefficients[piece.stiffness] >= 0.0 else -piece.side
+    if isinstance(kind, CornerSampling) and index >= len(kind.points):
+        return 1 if _stiffer_beyond(local, index - len(kind.points)) else -1
     level = levels(local)[index]
     if isinstance(kind, CornerSampling):
         # the side on which the force is stiffer, all other states at rest
@@ -101,6 +211,23 @@ def contact_side(local: LocalMotion, index: int) -> int:
     assert isinstance(local.element, Element)
     bend = local.element.curvature(np.array([level]), np.zeros(1), local.coefficients)[0]
     return -1 if float(bend[0]) < 0.0 else 1
+
+
+def _stiffer_beyond(local: LocalMotion, which: int) -> bool:
+    """Whether a law is stiffer where the function of a surface is positive: where the motion comes closest to it."""
+    law = as_coupled(local.element)
+    grid = search_grid(len(local.motion) - 1)
+    values = [motion(one, grid.zr, grid.zi) for one in local.motions]
+    q = np.array([u for u, _ in values] + [0.0 * v for _, v in values if local.element.depends_on_velocity])
+    theta = np.zeros(len(grid.zr))
+    here = law.surface(which, q, theta, local.coefficients)
+    way = here.normal / np.maximum((here.normal**2).sum(axis=0), np.finfo(float).tiny)
+    near = 1e-3 * (float(np.abs(here.value).max()) or 1.0)
+    above, below = (
+        float(np.abs(law.tangent(q + (side * near - here.value) * way, theta, local.coefficients)[1]).sum())
+        for side in (1.0, -1.0)
+    )
+    return above >= below
 
 
 def _along(element: BaseElement) -> float:

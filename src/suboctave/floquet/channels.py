@@ -31,6 +31,10 @@ _ROUGH = 1e-6
 #: corrections of a state that has left its side of a corner
 _CORRECTED = 3
 _NOTHING = Probe()
+#: a channel without motion reaches none of these
+_UNREACHED = np.array([[0.0, -1.0, 1.0], [0.0, 1.0, 1.0]])
+#: and how far in tau their marks may be apart
+_WIDEST = 1e-4
 
 
 class _Marked(NamedTuple):
@@ -71,9 +75,11 @@ class Channels:
         self._laws: list[tuple[GeneralLaw, int, Array]] = []
         self._tangents: list[Array] = []
         #: channels with marks of corners, by the first channel of their element; first and last panel between marks,
-        #: by channel
+        #: and how fast what vanishes there passes, by channel
         self._sliced: dict[int, list[_Marked]] = {}
-        self._slices: dict[int, list[tuple[int, int]]] = {}
+        self._slices: dict[int, list[tuple[int, int, float]]] = {}
+        #: surfaces with the channel of their marks
+        self._surfaces: list[tuple[int, Corner]] = []
         self._clock = -1
         if not state.packed.whole:
             for g, channel in enumerate(state.channels[: self.first]):
@@ -109,10 +115,15 @@ class Channels:
         self.forces[begin] = scale[0] * own.spectra[0]
         self._laws.append((nodal, self.first + begin, scale))
         velocity = nodal.velocity
-        for row, series in {corner.row: corner.series for corner in corners if corner.row}.items():
-            if series[1:].any():
-                places = [corner for corner in corners if corner.row == row]
-                self._mark(begin, self._channel(series, _probe(nodal, series, places)), places)
+        places = [corner for corner in corners if 0 < corner.row < along.size]
+        if places and velocity.any():
+            self._mark(begin, self._channel(velocity, _probe(nodal, velocity, places)), places)
+        for corner in corners:
+            if corner.row >= along.size:
+                # nothing moves along it: its marks are known
+                still = np.zeros_like(velocity)
+                self._surfaces.append((self._channel(still, Probe(_UNREACHED)), corner))
+                self._mark(begin, self._surfaces[-1][0], [corner])
         if law.sharp_velocities[0] and velocity.any():
             self._channel(velocity, Probe(NO_ROWS, *law.sharp_velocities))
         degree = max(1, law.degree - 1)
@@ -127,11 +138,6 @@ class Channels:
     def _mark(self, begin: int, channel: int, corners: list[Corner]) -> None:
         if corners:
             self._sliced.setdefault(self.first + begin, []).append(_Marked(channel, corners))
-
-    def beside(self, motions: ComplexArray) -> ComplexArray:
-        """Displacements (G, H + 1) with those of these channels behind them, as long as the longest."""
-        longest = max(motions.shape[1], *(len(one) for one in self.motions))
-        return np.array([np.pad(one, (0, longest - len(one))) for one in (*motions, *self.motions)])
 
     def _state(self, nodal: GeneralLaw, begin: int, path: Array) -> tuple[Array, Array]:
         """q (Q, N) and theta (N,) of an element at the nodes of the panels."""
@@ -174,7 +180,7 @@ class Channels:
                 new = nodal.tangent(_moved(nodal, q, theta, d), theta)[1]
             self._put(nodal, begin, scale, new, law)
             for marked in self._sliced.get(begin, ()):
-                for p, last in self._slices.get(marked.channel, ()):
+                for p, last, rate in self._slices.get(marked.channel, ()):
                     i, j = p * (ORDER - 1), (last + 1) * (ORDER - 1)
                     here = surface_at(nodal, marked.corners[0], q[:, i : i + 1], theta[i : i + 1])
                     normal, jumps = here.normal[:, 0], f_q[:, j] - f_q[:, i]
@@ -187,6 +193,23 @@ class Channels:
                     later, length = -(normal @ d[:, i]) / rate, 2.0 * spans[p, 0]
                     impulses = np.multiply.outer(jumps, -1.5 * later / length * (1.0 - NODES**2))
                     self._put(nodal, begin, scale, impulses, law[:, :, i : i + ORDER])
+
+    def marked(self, events: Array, owner: np.ndarray) -> Array:
+        """Events along a motion, rows as of `time_mesh.events_along`, with the marks just before and just behind every
+        corner at a surface; owner: see there.
+        """
+        rows = [events]
+        for channel, corner in self._surfaces:
+            far = 2.0 * _SLICE * corner.size / np.maximum(np.abs(corner.rate), np.finfo(float).tiny)
+            apart = np.abs(np.subtract.outer(corner.at, corner.at)) % (2.0 * math.pi)
+            apart = np.minimum(apart, 2.0 * math.pi - apart) + math.pi * np.eye(len(apart))
+            nearest = apart.min(axis=1, initial=_WIDEST)
+            for side, piece in zip((-1.0, 1.0), np.flatnonzero(owner == channel), strict=True):
+                block = np.zeros((len(corner.at), 6))
+                block[:, 0] = np.mod(corner.at + side * np.minimum(far, 0.25 * nearest), 2.0 * math.pi)
+                block[:, 1], block[:, 2], block[:, 3], block[:, 5] = np.inf, corner.rate, corner.second, piece
+                rows.append(block)
+        return np.concatenate(rows)
 
     def locate(self, events: Array, start: np.ndarray, owner: np.ndarray, panels: int) -> None:
         """Find the slices around corners: panels between the two marks of one corner.
@@ -208,7 +231,8 @@ class Channels:
             apart = (events[follow, 0] - events[i, 0]) % (2.0 * math.pi)
             if owner[pieces[follow]] == channel and own // 2 == other // 2 and own != other and 0.0 < apart < 1e-3:
                 last = int(start[follow]) - 1 if start[follow] > start[i] else panels - 1
-                self._slices.setdefault(channel, []).append((int(start[i]), last))
+                rate = self.state.rate * float(events[i, 2])
+                self._slices.setdefault(channel, []).append((int(start[i]), last, rate))
 
 
 def _inputs(nodal: GeneralLaw, begin: int, path: Array) -> Array:
@@ -219,14 +243,14 @@ def _inputs(nodal: GeneralLaw, begin: int, path: Array) -> Array:
 
 def _moved(nodal: GeneralLaw, q: Array, theta: Array, d: Array) -> Array:
     """The states `q + d`, which stay on their sides of all corners."""
-    moved, least = q + d, np.finfo(float).tiny
+    moved = q + d
     for corner in nodal.corners:
-        near = _SLICE * max(float(np.abs(corner.series).max()), least)
+        near = _SLICE * corner.size
         above = surface_at(nodal, corner, q, theta).value > 0.0
         for _ in range(_CORRECTED if corner.row >= len(q) else 1):
             surface = surface_at(nodal, corner, moved, theta)
             wanted = np.where(above, np.maximum(surface.value, near), np.minimum(surface.value, -near))
-            length = np.maximum((surface.normal**2).sum(axis=0), least)
+            length = np.maximum((surface.normal**2).sum(axis=0), np.finfo(float).tiny)
             moved = moved + (wanted - surface.value) / length * surface.normal
     return moved
 

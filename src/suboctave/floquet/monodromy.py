@@ -125,16 +125,15 @@ class _Linearised:
         self._laws = laws = PackedLaws(state.laws.groups, own.probes) if own.probes else state.packed
         self._motions, self._forces, self.active = state.motions, state.force_spectra, blocks.active
         if own.probes:
-            self._motions = own.beside(state.motions)
+            self._motions = np.concatenate((state.motions, own.motions))
             self._forces = np.concatenate((state.force_spectra[: own.first], own.forces))
             self.active = np.concatenate((np.arange(own.first), own.numbers))[blocks.active]
         degree = max(own.degree, laws.degree)
-        high = state.basis.harmonics
-        longest = min(longest_panel(np.ascontiguousarray(self._motions[:, : high + 1]), degree), own.finest)
+        longest = min(longest_panel(self._motions, degree), own.finest)
         self._kinked = laws.unknown_samples > 0 or own.unknown
         if laws.unknown_samples:
             longest = min(longest, BLIND / laws.unknown_samples)
-        grid = search_grid(self._motions.shape[1] - 1)
+        grid = search_grid(state.basis.harmonics)
         # singularities further away than the longest panel do not disturb it
         passed = [
             singular_instants(self._motions[g], points, widths, longest, grid.zr, grid.zi)
@@ -147,6 +146,7 @@ class _Linearised:
             blocks.turning, blocks.coupled, (state.basis.harmonics + 0.5) * state.rate, sum(_NEGLECTED),
         )  # fmt: skip
         events = events_along(self._motions, laws.pieces, laws.owner, passages, grid.zr, grid.zi)
+        events = own.marked(events, laws.owner)
         self.events = events[np.argsort(events[:, 0], kind="stable")]
         panels, start = panels_between(self.events, longest)
         self._evaluated(panels)
@@ -191,7 +191,7 @@ class _Linearised:
         self.spans, self.path = np.empty((count, ORDER)), np.empty((channels, 2, nodes))
         self.law, self.base = np.zeros((channels, 4, nodes)), np.zeros((channels, count))
         along_panels(
-            panels, self._motions, self._forces, self.state.basis.harmonics, self.state.rate, laws.pieces, laws.owner,
+            panels, self._motions, self._forces, self.state.rate, laws.pieces, laws.owner,
             laws.polynomial, laws.steps, laws.step_owner, laws.line, self.spans, self.path, self.law, self.base,
         )  # fmt: skip
         self._own.evaluate(self.path, self.law)

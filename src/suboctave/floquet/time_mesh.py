@@ -192,15 +192,13 @@ def longest_panel(c, degree):
 
 
 @kernel()
-def along_panels(
-    panels, c, forces, high, rate, pieces, owner, polynomial, steps, step_owner, line, spans, path, law, base
-):
+def along_panels(panels, c, forces, rate, pieces, owner, polynomial, steps, step_owner, line, spans, path, law, base):
     """Motion and laws at the nodes of panels; node j of panel p is node `p (m - 1) + j` of the period, N in all.
 
-    panels: see `panels_between`; c (G, .), forces (G, top + 1): displacement along the directions, and Fourier
-    coefficients of the force there, those up to `high` within the basis; pieces, owner: see `events_along`;
-    polynomial (G, D); steps (S, 3), step_owner (S,), line (G, 2): of arctan steps gap, width, stiffness, direction,
-    and constant and slope of the laws that they belong to. Into arrays, the last two of which are zero:
+    panels: see `panels_between`; c (G, H + 1), forces (G, top + 1): displacement along the directions, and Fourier
+    coefficients of the force there; pieces, owner: see `events_along`; polynomial (G, D); steps (S, 3),
+    step_owner (S,), line (G, 2): of arctan steps gap, width, stiffness, direction, and constant and slope of the laws
+    that they belong to. Into arrays, the last two of which are zero:
 
     - spans: dt/ds on every panel, s in [-1, 1], (P, m)
     - path: u, du/dt at the nodes, (G, 2, N)
@@ -226,9 +224,9 @@ def along_panels(
                 spans[p, j] = 0.5 * depth * (e + 1.0 / e) * half / rate
             cos[p * (m - 1) + j] = math.cos(tau)
             sin[p * (m - 1) + j] = math.sin(tau)
-    within = np.empty(high + 1, dtype=np.complex128)
+    within = np.empty(c.shape[1], dtype=np.complex128)
     for g in range(groups):
-        for k in range(high + 1):
+        for k in range(c.shape[1]):
             within[k] = (-2.0 if k > 0 else -1.0) * forces[g, k]
         displacement(c[g], cos, sin, path[g])
         displacement(within, cos, sin, law[g, :1])

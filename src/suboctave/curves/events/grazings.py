@@ -27,12 +27,10 @@ import numpy as np
 from suboctave.bifurcation.gaps import (
     GapExtrema,
     GrazingContact,
-    basis_rows,
     contact_side,
     gap_extrema,
-    level_rate,
-    levels,
-    read_direction,
+    height_at,
+    level_of,
 )
 from suboctave.continuation.newton import NewtonOptions
 from suboctave.continuation.point import point_between
@@ -102,7 +100,7 @@ class Touch(BifurcationKind):
         return GrazingContact(
             self.element,
             local.element.label,
-            levels(local)[self.index],
+            level_of(local, self.index),
             solution.tau / state.rate,
             f"{'begins' if begins else 'ceases'} to {verb}",
             state.omega if name == "omega" else state.values[name],
@@ -127,8 +125,8 @@ def height_gradient(
     state: BalanceState, element: int, index: int, tau: float, names: tuple[str, ...]
 ) -> tuple[Array, Array]:
     """Gradient of an extremum's height over a gap by coefficients, (2 H + 1, size), and by free parameters."""
-    by_x = np.multiply.outer(basis_rows(state.basis.harmonics, tau)[0], read_direction(state, element))
-    return by_x, np.array([-level_rate(state, element, index, name) for name in names])
+    height = height_at(state, element, index, tau, names)
+    return height.by_x, height.by_names
 
 
 def nearest_extremum(

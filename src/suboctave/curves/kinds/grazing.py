@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from suboctave.bifurcation.bifurcation import Bifurcation
-from suboctave.bifurcation.gaps import basis_rows, level_rate, levels, read_direction
+from suboctave.bifurcation.gaps import Height, gap_extrema, height_at
 from suboctave.curves.augmentation import Augmentation, Equations
 from suboctave.harmonic.basis import Array
 from suboctave.harmonic.evaluation import BalanceState
@@ -41,9 +41,10 @@ class GrazingContactEquations(Augmentation):
     ) -> tuple[GrazingContactEquations, Array]:
         """See `Augmentation.through`: of its contact."""
         assert item.contact is not None
-        places = np.array(levels(state.local(item.contact.element)))
-        index = int(np.argmin(np.abs(places - item.contact.gap)))
-        return cls.of(state, item.contact.element, index), np.array([item.contact.time * state.rate])
+        element, tau = item.contact.element, item.contact.time * state.rate
+        places = [gap.index for gap in gap_extrema(state) if gap.element == element]
+        index = min(places, key=lambda place: abs(height_at(state, element, place, tau).height))
+        return cls.of(state, element, index), np.array([tau])
 
     name = "grazing"
     extras = 1
@@ -70,31 +71,19 @@ class GrazingEquations(Equations):
         self.of, self.state, self.tau, self.names = of, state, tau, names
 
     @lazy
-    def _rows(self) -> tuple[Array, Array, Array, Array]:
-        rows = basis_rows(self.state.basis.harmonics, self.tau)
-        return (read_direction(self.state, self.of.element), *rows)
-
-    @lazy
-    def derivatives(self) -> tuple[float, float, float]:
-        """u and its first two derivatives by tau at the instant."""
-        direction, *rows = self._rows
-        u = self.state.x @ direction
-        value, slope, curve = (float(row @ u) for row in rows)
-        return value, slope, curve
+    def height(self) -> Height:
+        """How far the element lies above its gap at the instant."""
+        return height_at(self.state, self.of.element, self.of.index, self.tau, self.names)
 
     @lazy
     def values(self) -> Array:
-        gap = levels(self.state.local(self.of.element))[self.of.index]
-        value, slope, _ = self.derivatives
-        return np.array([value - gap, slope]) / self.of.unit
+        return np.array([self.height.height, self.height.slope]) / self.of.unit
 
     @property
     def rows(self) -> Array:
-        direction, first, second, _ = self._rows
-        _, slope, curve = self.derivatives
-        gap = [-level_rate(self.state, self.of.element, self.of.index, name) for name in self.names]
-        above = np.concatenate((np.multiply.outer(first, direction).ravel(), [slope], gap))
-        level = np.concatenate((np.multiply.outer(second, direction).ravel(), [curve], np.zeros(len(gap))))
+        h = self.height
+        above = np.concatenate((h.by_x.ravel(), [h.slope], h.by_names))
+        level = np.concatenate((h.slope_by_x.ravel(), [h.curve], h.slope_by_names))
         return np.array([above, level]) / self.of.unit
 
     def renewed(self) -> GrazingContactEquations:

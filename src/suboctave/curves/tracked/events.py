@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from suboctave.bifurcation.bifurcation import TrackedEvent
-from suboctave.bifurcation.gaps import GrazingContact, levels
+from suboctave.bifurcation.gaps import GrazingContact, level_of
 from suboctave.continuation.events import Bracket
 from suboctave.continuation.linear import Factor, length
 from suboctave.continuation.newton import NewtonOptions, correct, null_row
@@ -523,7 +523,7 @@ def _contact(sample: Sample) -> GrazingContact | None:
     local = state.local(of.element)
     time = sample.instant_or_frequency / state.rate
     value = float(sample.point.u[-1])
-    return GrazingContact(of.element, local.element.label, levels(local)[of.index], time, "", value)
+    return GrazingContact(of.element, local.element.label, level_of(local, of.index), time, "", value)
 
 
 def _isola(event: LocatedEvent) -> str:

@@ -17,40 +17,52 @@ for derivatives by tau; for delta' see `law`.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from suboctave.harmonic.aft.law import Along, Third
 from suboctave.harmonic.basis import Array, ComplexArray
-from suboctave.harmonic.quadrature import FEWEST, GAUSS, Nodes, search_grid, uniform_nodes
+from suboctave.harmonic.quadrature import GAUSS, Nodes, search_grid
 from suboctave.harmonic.trigonometric import crossings_of, extrema, motion
 from suboctave.model.elements.base import BaseElement
 from suboctave.model.elements.smoothness import CornerSampling, Sampling, Surface
 
-_NO_INSTANTS = np.zeros(0)
 #: how far on either side of a corner its jump is looked at, in units of phi along the motion
 BESIDE = 1e-9
 #: step in the phase of the load by which the jump of a slope is differentiated
 _PHASE = 1e-3
 #: distance from a rough corner, in the same units, at which the strength of its singularity is looked at
 _NEAR = 1e-6
-#: share of the largest coefficient below which those of phi are left out, most instants that they are taken from, and
-#: corrections of the instants of corners for what that leaves
-_RESOLVED, _MOST, _CORRECTIONS = 1e-11, 2048, 3
+#: step in tau by which the second derivative of a surface's function is told; secants towards its zeros and extrema,
+#: and how far the last may move these
+_STEP, _SECANTS, _CLOSE, _ABOUT = 1e-5, 40, 1e-12, 1e-8
 
 
 class Corner(NamedTuple):
-    """A corner of a law: its number, points first, then velocities and surfaces; the row of q that has it at `level`,
-    or that many rows and the number of its surface; phi and the level as complex coefficients along the motion (., ),
-    and the instants at which the motion reaches it.
+    """A corner of a law along a motion.
+
+    number, row
+        Its number, points first, then velocities and surfaces; the row of q that has it at `level`, or as many as there
+        are rows and the number of its surface.
+    level, size
+        And about the largest value of the displacement, the velocity or phi along the motion.
+    at, rate, second
+        The instants at which the motion reaches it, and the first two derivatives of phi by tau there, (N,).
+    turns
+        The extrema of phi, its level included: tau, value, second derivative, (3, m).
     """
 
     number: int
     row: int
     level: float
-    series: ComplexArray
+    size: float
     at: Array
+    rate: Array
+    second: Array
+    turns: Array
 
 
 class Comb(NamedTuple):
@@ -84,6 +96,7 @@ class Cornered(Protocol):
     def nodes(self) -> Nodes: ...
     def state_at(self, zr: Array, zi: Array) -> tuple[Array, Array]: ...
     def surface(self, which: int, q: Array, theta: Array) -> Surface: ...
+    def surface_slopes(self, which: int, q: Array, theta: Array) -> tuple[Array, Array, Array]: ...
     def tangent(self, q: Array, theta: Array) -> tuple[Array, Array]: ...
     def curvature(self, q: Array, theta: Array) -> Array: ...
     def third_derivative(self, q: Array, theta: Array) -> Array: ...
@@ -96,44 +109,72 @@ def corners_along(law: Cornered) -> list[Corner]:
         return []
     found: list[Corner] = []
     for row, series, levels in ((0, along.motion, kind.points), (law.count, law.velocity, kind.velocities)):
+        grid = search_grid(along.high)
+        turns = extrema(series, grid.zr, grid.zi)
         for level in levels:
             # a velocity that is zero throughout rests in its corner
-            at = _passed(series, float(level)) if series[1:].any() else _NO_INSTANTS
-            found.append(Corner(len(found), row, float(level), series, at))
-    for which in range(kind.surfaces):
-        series = _along_motion(law, which)
-        corner = Corner(len(found), along.size + which, 0.0, series, _passed(series, 0.0))
-        for _ in range(_CORRECTIONS if len(corner.at) else 0):
-            # what the series lacks
-            zr, zi = np.cos(corner.at), np.sin(corner.at)
-            surface = law.surface(which, *law.state_at(zr, zi))
-            rate = (surface.normal * _rates_of_state(law, zr, zi)).sum(axis=0) + along.nu * surface.by_phase
-            corner = corner._replace(at=corner.at - surface.value / _kept_from_zero(rate, size_of(corner)))
-        found.append(corner)
-    return found
+            at = crossings_of(series, float(level), turns)[0] if series[1:].any() else np.zeros(0)
+            zr, zi = np.cos(at), np.sin(at)
+            size = float(np.abs(series).sum()) or 1.0
+            rate, second = motion(series, zr, zi)[1], _second_rate(series, zr, zi)
+            found.append(Corner(len(found), row, float(level), size, at, rate, second, turns))
+    return found + [_at_surface(law, which, len(found) + which) for which in range(kind.surfaces)]
 
 
-def _passed(series: ComplexArray, level: float) -> Array:
-    """Instants at which a function with these complex coefficients passes a level."""
-    grid = search_grid(len(series) - 1)
-    return np.asarray(crossings_of(series, level, extrema(series, grid.zr, grid.zi))[0])
+def _at_surface(law: Cornered, which: int, number: int) -> Corner:
+    """Where the function of a surface turns along the motion, and vanishes."""
+
+    def value(tau: Array) -> Array:
+        return law.surface_slopes(which, *law.state_at(np.cos(tau), np.sin(tau)))[0]
+
+    def rate(tau: Array) -> Array:
+        zr, zi = np.cos(tau), np.sin(tau)
+        _, normal, by_phase = law.surface_slopes(which, *law.state_at(zr, zi))
+        result: Array = (normal * rates_of_state(law, zr, zi)).sum(axis=0) + law.along.nu * by_phase
+        return result
+
+    def second(tau: Array) -> Array:
+        return (rate(tau + _STEP) - rate(tau - _STEP)) / (2.0 * _STEP)
+
+    tau = search_grid(2 * law.along.high).tau
+    slopes = rate(tau)
+    here = np.flatnonzero((slopes > 0.0) != (np.roll(slopes, -1) > 0.0))
+    turns = _zeros(rate, tau[here], tau[here] + tau[1] - tau[0], _ABOUT)
+    heights = value(turns)
+    there = np.flatnonzero((heights > 0.0) != (np.roll(heights, -1) > 0.0))
+    last = np.roll(turns, -1)[there]
+    at = _zeros(value, turns[there], np.where(last < turns[there], last + 2.0 * math.pi, last), _CLOSE)
+    size = float(np.abs(value(tau)).max()) or 1.0
+    extremes = np.array([turns, heights, second(turns)])
+    return Corner(number, law.along.size + which, 0.0, size, at, rate(at), second(at), extremes)
 
 
-def _along_motion(law: Cornered, which: int) -> ComplexArray:
-    """Complex coefficients of a surface's function along the motion, as many as it has."""
-    count = FEWEST
-    while count < 8 * (law.along.high + 1):
-        count *= 2
-    while True:
-        nodes = uniform_nodes(count)
-        series = np.fft.rfft(law.surface(which, *law.state_at(nodes.zr, nodes.zi)).value) / count
-        series[1:] *= 2.0
-        sizes = np.abs(series)
-        kept = np.flatnonzero(sizes > _RESOLVED * sizes.max(initial=0.0))
-        last = int(kept[-1]) if len(kept) else 0
-        if last < count // 4 or count >= _MOST:
-            return np.ascontiguousarray(series[: max(2, min(last, count // 4) + 1)])
-        count *= 2
+def _zeros(function: Callable[[Array], Array], low: Array, high: Array, close: float) -> Array:
+    """The zeros of a function between instants at which it differs in sign, many at once: by secants that halve the
+    value at an end that stays (the Illinois method), until they move by less than `close`.
+    """
+    if not len(low):
+        return low
+    at, values = np.array([low, high]), np.array([function(low), function(high)])
+    root, before = low, np.zeros(len(low), dtype=bool)
+    for turn in range(_SECANTS):
+        apart = values[1] - values[0]
+        share = np.where(apart == 0.0, 0.5, -values[0] / np.where(apart == 0.0, 1.0, apart))
+        previous, root = root, at[0] + share * (at[1] - at[0])
+        if np.abs(root - previous).max() < close:
+            break
+        here = function(root)
+        left = (here > 0.0) == (values[0] > 0.0)
+        # an end that stays twice
+        again = 0.5 if turn else 1.0
+        stays = np.where(left == before, again, 1.0) * values
+        values, at, before = np.where([left, ~left], here, stays), np.where([left, ~left], root, at), left
+    return root
+
+
+def gaps_of(law: Cornered) -> list[Corner]:
+    """The corners at which a contact may begin: those at displacements and at surfaces."""
+    return [corner for corner in law.corners if corner.row == 0 or corner.row >= law.along.size]
 
 
 def surface_at(law: Cornered, corner: Corner, q: Array, theta: Array) -> Surface:
@@ -166,14 +207,9 @@ def combs(law: Cornered) -> list[Comb]:
         q, theta = law.state_at(zr, zi)
         surface = surface_at(law, corner, q, theta)
         # the rate is kept from zero where the motion only touches the corner
-        rates = np.maximum(np.abs(motion(corner.series, zr, zi)[1]), 1e-12 * size_of(corner))
+        rates = np.maximum(np.abs(corner.rate), 1e-12 * corner.size)
         found.append(Comb(corner, zr, zi, surface, jump(law, corner, q, theta) / rates))
     return found
-
-
-def size_of(corner: Corner) -> float:
-    """About the largest value that phi and its level take along the motion."""
-    return float(np.abs(corner.series).sum()) or 1.0
 
 
 def jump(law: Cornered, corner: Corner, q: Array, theta: Array) -> Array:
@@ -194,7 +230,7 @@ def beside(law: Cornered, corner: Corner, q: Array, theta: Array, distance: floa
     """States above and below a corner, at a distance in units of phi along the motion, and phi at the given ones."""
     surface = surface_at(law, corner, q, theta)
     way = surface.normal / (surface.normal**2).sum(axis=0)
-    on_it, far = q - surface.value * way, distance * size_of(corner)
+    on_it, far = q - surface.value * way, distance * corner.size
     return on_it + far * way, on_it - far * way, surface
 
 
@@ -202,7 +238,7 @@ def third_at(law: Cornered, corner: Corner) -> Third:
     """Dirac functions and their derivatives at one corner."""
     zr, zi = np.cos(corner.at), np.sin(corner.at)
     q, theta = law.state_at(zr, zi)
-    surface, first = surface_at(law, corner, q, theta), _rates_of_state(law, zr, zi)
+    surface, first = surface_at(law, corner, q, theta), rates_of_state(law, zr, zi)
     normal, bend = surface.normal, surface.bend
     length = (normal**2).sum(axis=0)
 
@@ -229,11 +265,10 @@ def third_at(law: Cornered, corner: Corner) -> Third:
         # the corner moves with the phase, and with it the state on it
         turning = turning + law.along.nu * (by_phase + across * surface.by_phase / length)
     turned = np.einsum("abn,bn->an", bend, first) + law.along.nu * surface.normal_by_phase
-    rate, second = motion(corner.series, zr, zi)[1], _second_rate(corner.series, zr, zi)
-    rate = _kept_from_zero(rate, size_of(corner))
+    rate = _kept_from_zero(corner.rate, corner.size)
     cube = np.einsum("an,bn,cn->abcn", normal, normal, normal)
     weights = _symmetric(slope - eta * turned / rate, normal) + eta * _three_ways(bend, normal)
-    weights = (weights - (turning / rate - eta * second / rate**2) * cube) / np.abs(rate)
+    weights = (weights - (turning / rate - eta * corner.second / rate**2) * cube) / np.abs(rate)
     return Third(zr, zi, weights, -eta * cube / (rate * np.abs(rate)))
 
 
@@ -259,7 +294,7 @@ def finite_part(law: Cornered, corner: Corner) -> Third:
     s, share = 0.5 + 0.5 * GAUSS[0], 0.5 * GAUSS[1]
     zr, zi = np.cos(at), np.sin(at)
     q, theta = law.state_at(zr, zi)
-    slope = _kept_from_zero(motion(corner.series, zr, zi)[1], size_of(corner))
+    slope = _kept_from_zero(corner.rate, corner.size)
     nodes = law.nodes.tau.reshape(-1, len(s))
     weights = np.zeros((len(q),) * 3 + (len(at),))
     for side in (1.0, -1.0):
@@ -279,7 +314,7 @@ def finite_part(law: Cornered, corner: Corner) -> Third:
 def _singularity(law: Cornered, corner: Corner, side: float, q: Array, theta: Array) -> tuple[Array, Array]:
     """Exponent p and strength K of f_rrr on one side of a corner; p = 0 where it is not singular."""
     row = corner.row
-    y = _NEAR * size_of(corner)
+    y = _NEAR * corner.size
 
     def third(distance: float) -> Array:
         there = q.copy()
@@ -324,7 +359,7 @@ def _second_rate(series: ComplexArray, zr: Array, zi: Array) -> Array:
     return second
 
 
-def _rates_of_state(law: Cornered, zr: Array, zi: Array) -> Array:
+def rates_of_state(law: Cornered, zr: Array, zi: Array) -> Array:
     """Derivatives by tau of q at instants, (Q, N)."""
     along = law.along
     first = [motion(one, zr, zi)[1] for one in along.motions]

@@ -142,6 +142,10 @@ class GeneralLaw(LawAlong):
         """What the function of a surface at which the law has corners does at states."""
         return as_coupled(self.element).surface(which, q, theta, self.c)
 
+    def surface_slopes(self, which: int, q: Array, theta: Array) -> tuple[Array, Array, Array]:
+        """That function with its first derivatives by the state and the phase."""
+        return as_coupled(self.element).surface_slopes(which, q, theta, self.c)
+
     @lazy
     def path(self) -> tuple[Array, Array]:
         """q (Q', N) and theta (N,) at the nodes."""
@@ -260,7 +264,10 @@ class GeneralLaw(LawAlong):
         previous: ComplexArray | None = None
         while count <= MOST:
             current = np.zeros((1 + along.size, along.top + 1), dtype=complex)
-            GeneralLaw(along, [member._replace(samples=count)]).add_spectra(current)
+            law = GeneralLaw(along, [member._replace(samples=count)])
+            # the same at all numbers
+            vars(law)["corners"] = self.corners
+            law.add_spectra(current)
             if previous is not None and settled(previous, current):
                 return count // 2
             previous, count = current, 2 * count

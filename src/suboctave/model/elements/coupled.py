@@ -81,6 +81,11 @@ class CoupledElement(BaseElement):
         """The function number `which` at whose zeros the law has corners, for a law whose `sampling` tells of some."""
         raise _without_surfaces(self)
 
+    def surface_slopes(self, which: int, q: Array, theta: Array, c: Array) -> tuple[Array, Array, Array]:
+        """`phi`, `phi_q`, `phi_theta` of it, (N,), (Q, N), (N,): asked for more often than the others."""
+        surface = self.surface(which, q, theta, c)
+        return surface.value, surface.normal, surface.by_phase
+
 
 def _without_surfaces(element: BaseElement) -> InputError:
     return InputError(f"{element.label}: sampling tells of corners at surfaces, so its class must define surface()")
@@ -133,6 +138,9 @@ class _OneInput:
         return self.element.coefficient_curvature(*self._state(q), c)
 
     def surface(self, which: int, q: Array, theta: Array, c: Array) -> Surface:
+        raise _without_surfaces(self.element)
+
+    def surface_slopes(self, which: int, q: Array, theta: Array, c: Array) -> tuple[Array, Array, Array]:
         raise _without_surfaces(self.element)
 
 
@@ -239,3 +247,6 @@ class Expression(CoupledElement):
 
     def surface(self, which: int, q: Array, theta: Array, c: Array) -> Surface:
         return self._law.surface(which, q, theta, c)
+
+    def surface_slopes(self, which: int, q: Array, theta: Array, c: Array) -> tuple[Array, Array, Array]:
+        return self._law.surface_slopes(which, q, theta, c)

@@ -282,19 +282,24 @@ class Law:
 
     def surface(self, which: int, q: Array, theta: Array, c: Array) -> Surface:
         """See `CoupledElement.surface`."""
+        value, normal, by_phase = self.surface_slopes(which, q, theta, c)
         phi, states, size = self._surfaces[which], self.q, len(self.q)
 
         def parts() -> list[Any]:
-            normal = [phi.diff(a) for a in states]
-            bends = [a.diff(b) for a in normal for b in states]
-            by_phase = [one.diff(self.phase) for one in (phi, *normal)]
-            return [phi, *normal, *bends, *by_phase, *(phi.diff(a) for a in self.c)]
+            normals = [phi.diff(a) for a in states]
+            bends = [a.diff(b) for a in normals for b in states]
+            return [*bends, *(a.diff(self.phase) for a in normals), *(phi.diff(a) for a in self.c)]
 
-        values = self._code(f"surface {which}", parts)(q, theta, c)
-        value, normal, bend, by_phase, normal_by_phase, by_c = np.split(
-            values, np.cumsum([1, size, size * size, 1, size])
-        )
-        return Surface(value[0], normal, bend.reshape(size, size, -1), by_phase[0], normal_by_phase, by_c)
+        values = self._code(f"surface {which}, more", parts)(q, theta, c)
+        bend, normal_by_phase, by_c = np.split(values, [size * size, size * size + size])
+        return Surface(value, normal, bend.reshape(size, size, -1), by_phase, normal_by_phase, by_c)
+
+    def surface_slopes(self, which: int, q: Array, theta: Array, c: Array) -> tuple[Array, Array, Array]:
+        """See `CoupledElement.surface_slopes`."""
+        phi = self._surfaces[which]
+        code = self._code(f"surface {which}", lambda: [phi, *(phi.diff(a) for a in self.q), phi.diff(self.phase)])
+        values = code(q, theta, c)
+        return values[0], values[1:-1], values[-1]
 
     def coefficient_curvature(self, q: Array, theta: Array, c: Array) -> Array:
         """`f_cc`, (nc, nc, N)."""
