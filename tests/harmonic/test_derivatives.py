@@ -56,7 +56,7 @@ def own_nodes():
     ]
 
 
-@pytest.fixture(scope="module", params=["exact", "regularised", "damper", "own nodes", "rough"])
+@pytest.fixture(scope="module", params=["exact", "regularised", "damper", "own nodes", "rough", "surfaces"])
 def elements(request, damper):
     cubic = CubicSpring(0, "alpha")
     return {
@@ -68,6 +68,14 @@ def elements(request, damper):
         "rough": [
             cubic,
             Expression(0, "Kc*max(x - j, 0)**1.5*(1 + zeta*x') + p*abs(x - j)*(1 + y)*(1 + 0.3*cos(omega*t))", INPUTS),
+        ],
+        # corners where functions of several displacements, of velocities and of time vanish
+        "surfaces": [
+            cubic,
+            Expression(
+                0, "Kc*max(x*(1+0.4*y) + 0.3*y - j*(1 + 0.3*cos(omega*t + p)), 0)*(1 + zeta*x' + 0.5*y)", INPUTS
+            ),
+            Expression(1, "k*max(sqrt(x**2 + y**2 + 0.1) - 2*j, 0)*x + alpha*abs(x' - 0.5*y + k*y'*x)", INPUTS),
         ],
         "damper": [cubic, damper(0, ["zeta*k", "j**2"]), damper((0, 1), ["alpha", "zeta+Kc*j"])],
     }[request.param]

@@ -37,7 +37,8 @@ CASES = [
     ("k*tanh(v/v0) + a*atan(x)", None, AdaptiveSampling),
     ("k*x*y**2*sin(omega*t) + c*y'*x", {"x": 0, "y": (1, 2)}, PolynomialSampling),
     ("k*abs(u)*w + b*w'**3", {"w": 1, "u": [1.0, -2.0, 0.0]}, CornerSampling),
-    ("k*abs(u)*max(w, 0)", {"w": 1, "u": [1.0, -2.0, 0.0]}, AdaptiveSampling),
+    ("k*abs(u)*max(w, 0)", {"w": 1, "u": [1.0, -2.0, 0.0]}, CornerSampling),
+    ("k*abs(abs(u) - w)*w", {"w": 1, "u": [1.0, -2.0, 0.0]}, AdaptiveSampling),
     ("k*max(u - j, 0)*w", {"u": [1.0, -2.0, 0.0], "w": 1}, CornerSampling),
 ]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,7 +17,8 @@ from suboctave.floquet.methods import method_of
 from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.kinds import KINDS
-from suboctave.model.elements.coupled import reads
+from suboctave.model.elements.coupled import as_coupled, reads
+from suboctave.model.elements.smoothness import CornerSampling
 from suboctave.model.projected import ProjectedSystem
 from suboctave.model.system import System
 from suboctave.projection import system_of_motions
@@ -191,16 +193,37 @@ def distance_from_gap(system: System, what: Bifurcation, state: Array, omega: fl
     period = 2.0 * math.pi * what.orbit.basis.nu / omega
     path = integrate(system, state, (0.0, period), omega)
     window = 0.5 * period / (what.orbit.basis.harmonics + 1)
-    direction = reads(system.elements[contact.element], system.n)
+    read = _read(system, contact.element, contact.gap)
     grid, centre = np.linspace(-1.0, 1.0, 201), contact.time
     for _ in range(3):  # the window closes on the extremum
-        u = path.at(np.mod(centre + window * grid, period))[0] @ direction
+        times = np.mod(centre + window * grid, period)
+        u = read(*path.at(times), omega * times)
         a, b, c = np.polyfit(grid, u, 2)
         at = float(np.clip(-0.5 * b / a, -1.0, 1.0)) if a != 0.0 else 0.0
         value = float(c + at * b + at**2 * a)
         centre, window = centre + at * window, 0.1 * window
-    size = float(np.abs(path.at(np.linspace(0.0, period, 200))[0] @ direction).max())
+    times = np.linspace(0.0, period, 200)
+    size = float(np.abs(read(*path.at(times), omega * times)).max())
     return abs(value - contact.gap) / size
+
+
+def _read(system: System, number: int, gap: float) -> Callable[[Array, Array, Array], Array]:
+    """What an element reads of states x (N, n), v and phases (N,) of which a gap is a place: a displacement, or the
+    function of a surface, that nearest to zero of several.
+    """
+    element = system.elements[number]
+    c = element.coefficient_values(system.parameters)
+    kind, inputs, law = element.sampling(c), element.inputs(system.n), as_coupled(element)
+    if not isinstance(kind, CornerSampling) or not kind.surfaces or gap in kind.points:
+        direction = reads(element, system.n)
+        return lambda x, v, theta: x @ direction
+
+    def function(x: Array, v: Array, theta: Array) -> Array:
+        q = np.concatenate((inputs @ x.T, inputs @ v.T)) if element.depends_on_velocity else inputs @ x.T
+        values = [law.surface_slopes(which, q, theta, c)[0] for which in range(kind.surfaces)]
+        return min(values, key=lambda one: float(np.abs(one).min()))
+
+    return function
 
 
 def recovered_solution(system: System, solution: PeriodicSolution) -> PeriodicSolution:

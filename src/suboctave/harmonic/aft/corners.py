@@ -39,6 +39,8 @@ _NEAR = 1e-6
 #: step in tau by which the second derivative of a surface's function is told; secants towards its zeros and extrema,
 #: and how far the last may move these
 _STEP, _SECANTS, _CLOSE, _ABOUT = 1e-5, 40, 1e-12, 1e-8
+#: change of a surface's function along a motion, relative to its terms, that is rounding
+_ROUNDING = 1e-13
 
 
 class Corner(NamedTuple):
@@ -137,14 +139,20 @@ def _at_surface(law: Cornered, which: int, number: int) -> Corner:
         return (rate(tau + _STEP) - rate(tau - _STEP)) / (2.0 * _STEP)
 
     tau = search_grid(2 * law.along.high).tau
-    slopes = rate(tau)
+    slopes, heights = rate(tau), value(tau)
+    size = float(np.abs(heights).max()) or 1.0
+    q, theta = law.state_at(np.cos(tau), np.sin(tau))
+    terms = float(np.abs(q * law.surface_slopes(which, q, theta)[1]).sum(axis=0).max())
+    if np.ptp(heights) <= _ROUNDING * max(size, terms):
+        # it stays as it is along the motion, as the radius of a circle does
+        none = np.zeros(0)
+        return Corner(number, law.along.size + which, 0.0, size, none, none, none, np.zeros((3, 0)))
     here = np.flatnonzero((slopes > 0.0) != (np.roll(slopes, -1) > 0.0))
     turns = _zeros(rate, tau[here], tau[here] + tau[1] - tau[0], _ABOUT)
     heights = value(turns)
     there = np.flatnonzero((heights > 0.0) != (np.roll(heights, -1) > 0.0))
     last = np.roll(turns, -1)[there]
     at = _zeros(value, turns[there], np.where(last < turns[there], last + 2.0 * math.pi, last), _CLOSE)
-    size = float(np.abs(value(tau)).max()) or 1.0
     extremes = np.array([turns, heights, second(turns)])
     return Corner(number, law.along.size + which, 0.0, size, at, rate(at), second(at), extremes)
 
@@ -227,11 +235,15 @@ def jump(law: Cornered, corner: Corner, q: Array, theta: Array) -> Array:
 
 
 def beside(law: Cornered, corner: Corner, q: Array, theta: Array, distance: float) -> tuple[Array, Array, Surface]:
-    """States above and below a corner, at a distance in units of phi along the motion, and phi at the given ones."""
+    """States above and below a corner, at a distance in units of phi along the motion, and phi at the corner, that
+    nearest to states q (Q, N).
+    """
     surface = surface_at(law, corner, q, theta)
-    way = surface.normal / (surface.normal**2).sum(axis=0)
-    on_it, far = q - surface.value * way, distance * corner.size
-    return on_it + far * way, on_it - far * way, surface
+    for _ in range(2 if surface.value.any() else 0):
+        q = q - surface.value * surface.normal / (surface.normal**2).sum(axis=0)
+        surface = surface_at(law, corner, q, theta)
+    far = distance * corner.size * surface.normal / (surface.normal**2).sum(axis=0)
+    return q + far, q - far, surface
 
 
 def third_at(law: Cornered, corner: Corner) -> Third:
