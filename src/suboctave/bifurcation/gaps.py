@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from suboctave.harmonic.aft.closed_form import corner_weights
+from suboctave.harmonic.aft.general import GeneralLaw
 from suboctave.harmonic.aft.law import LocalMotion
 from suboctave.harmonic.basis import Array
 from suboctave.harmonic.evaluation import BalanceState
@@ -101,6 +102,23 @@ def contact_side(local: LocalMotion, index: int) -> int:
     assert isinstance(local.element, Element)
     bend = local.element.curvature(np.array([level]), np.zeros(1), local.coefficients)[0]
     return -1 if float(bend[0]) < 0.0 else 1
+
+
+def stiffness_jump(state: BalanceState, element: int, index: int, tau: float) -> float:
+    """By how much the stiffness along what an element reads jumps where the motion reaches a gap at an instant; 0 where
+    it does not (a rounded corner, powers of a half).
+    """
+    local = state.local(element)
+    kind = local.kind
+    if isinstance(kind, PiecewiseLinear):
+        return float(local.coefficients[kind.pieces[index].stiffness]) * kind.pieces[index].side
+    if not isinstance(kind, CornerSampling) or kind.rough:
+        return 0.0
+    members = (pair for channel in state.own_channels for pair in channel.members())
+    law = next(law for law, member in members if member.number == element)
+    assert isinstance(law, GeneralLaw)
+    there = law.state_at(np.cos([tau]), np.sin([tau]))
+    return float(law.jump(law.corners[index], *there)[0])
 
 
 def _along(element: BaseElement) -> float:

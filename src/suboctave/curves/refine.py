@@ -173,8 +173,7 @@ def _with_more_harmonics(located: Located, a: Sample, b: Sample) -> Singular | N
     if beyond is None:
         return None
     wide = located.sample.curve.with_balance(beyond.state.balance)
-    there, point = located.sample.curve.transfer(wide.u_of(beyond.state), wide), located.sample.point
-    return beyond if distance(there, point.u, point.weights) <= b.point.arclength - a.point.arclength else None
+    return beyond if _within_reach(beyond, wide, a, b) else None
 
 
 def _refined(
@@ -210,6 +209,9 @@ def _refined(
                 behind = behind_grazing(kind, guess)
                 if behind is None or not _lies_between(behind, wide, *neighbours):
                     behind = _between(kind, wide, *neighbours)
+                if behind is None and not _within_reach(better, wide, *neighbours):
+                    there = _guess_from(better, curve).parameter
+                    raise ConvergenceError(f"it leads to another one, at {curve.name} = {there:.6g}")
                 better = behind or better
         except ConvergenceError as failure:
             warnings.append(
@@ -238,6 +240,15 @@ def _lies_between(solution: Singular, curve: MotionProblem, a: Sample, b: Sample
         ends = _ends(curve, a, b)
         share = None if ends is None else position(ends[0].point, ends[1].point, there)
     return share is not None and -_MOVED <= share <= 1.0 + _MOVED
+
+
+def _within_reach(solution: Singular, curve: MotionProblem, a: Sample, b: Sample) -> bool:
+    """Whether a solution, one of the motions of `curve`, lies no farther from either of two samples than they are
+    apart: a bifurcation that harmonics move out of a short step; one farther off is another.
+    """
+    u, way = curve.u_of(solution.state), b.point.arclength - a.point.arclength
+    away = (distance(s.curve.transfer(u, curve), s.point.u, b.point.weights) for s in (a, b))
+    return min(away) <= way
 
 
 def _between(kind: BifurcationKind, curve: MotionProblem, a: Sample, b: Sample) -> Singular | None:
