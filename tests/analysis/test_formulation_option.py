@@ -158,6 +158,17 @@ def test_the_count_takes_what_is_accounted_for_elsewhere(two):
         assert (check.complaint(ends[1], ["PD"] * unseen) is None) is unseen
 
 
+def test_the_count_says_in_words_that_it_should_have_changed(two):
+    """One located period doubling between motions with as many unstable multipliers."""
+    curve = so.frequency_response(two, (4.1, 3.9), 7)
+    check, sample = CountCheck(), _Sample(curve.points[0].floquet)
+    assert check.complaint(sample, []) is None
+    assert check.complaint(sample, ["PD"])[2].startswith(
+        f"as many multipliers are unstable behind as before ({sample.unstable}), although each of the bifurcations "
+        "located there (PD) changes their number"
+    )
+
+
 class _Sample:
     def __init__(self, floquet):
         self.floquet = floquet

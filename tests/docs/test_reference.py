@@ -8,6 +8,7 @@ import pytest
 from pages import DOCS
 
 import suboctave
+import suboctave as so
 
 PAGES = {path.stem: path.read_text(encoding="utf-8") for path in sorted((DOCS / "api").glob("*.md"))}
 #: the sections of all pages by the name that they are about
@@ -57,3 +58,38 @@ def test_the_list_of_the_reference_names_all():
 
 def test_the_citation_is_of_this_version():
     assert f"\nversion: {suboctave.__version__}\n" in (DOCS.parent / "CITATION.cff").read_text(encoding="utf-8")
+
+
+#: modules and files that go by the names of results
+OTHERS = {"nc", "png", "gif", "bordered", "measures", "extremum"}
+
+
+@pytest.fixture(scope="module")
+def results():
+    """Results by the names that pages give them."""
+    system = so.library.duffing(c=0.05, F=0.3)
+    diagram = so.bifurcation_diagram(system, (2.5, 0.8), 0, harmonics=3)
+    branch = next(iter(diagram)).branch
+    fold = branch.bifurcations["LP"][0]
+    tracked = so.track(fold, "F", (0.29, 0.31))
+    mode = so.nonlinear_mode(so.System(1.0, 0.0, 1.0, [so.CubicSpring(0, 1.0)]), amplitude=0.2, harmonics=3)
+    motion = so.integrate(system, omega=1.0, periods=2)
+    brute = so.brute_force_diagram(system, (1.0, 1.1), count=2, transient=5, periods=8)
+    return {
+        **dict.fromkeys(("curve", "branch"), (branch, tracked, mode)),
+        **dict.fromkeys(("orbit", "motion"), (branch.orbits[0], motion)),
+        **dict.fromkeys(("event", "bifurcation"), (fold, *tracked.events)),
+        "diagram": (diagram, brute),
+    }
+
+
+def test_attributes_that_pages_speak_of_exist(results):
+    """In running text; blocks of code are run."""
+    missing = []
+    for path in sorted(DOCS.rglob("*.md")):
+        text = re.sub(r"```.*?```", "", path.read_text(encoding="utf-8"), flags=re.S)
+        for code in re.findall(r"`([^`\n]+)`", text):
+            for name, attribute in re.findall(rf"(?<![\w.])({'|'.join(results)})\.([a-z_]\w*)", code):
+                if attribute not in OTHERS and not any(hasattr(one, attribute) for one in results[name]):
+                    missing.append(f"{path.name}: {name}.{attribute}")
+    assert not missing, "\n".join(missing)

@@ -16,7 +16,7 @@ import numpy as np
 
 from suboctave.harmonic.aft.channel import Channel
 from suboctave.harmonic.aft.closed_form import corner_weights
-from suboctave.harmonic.aft.corners import Corner, gaps_of, rates_of_state, surface_at
+from suboctave.harmonic.aft.corners import Corner, gaps_of, jump, rates_of_state, surface_at
 from suboctave.harmonic.aft.general import GeneralLaw
 from suboctave.harmonic.aft.law import LocalMotion
 from suboctave.harmonic.basis import Array
@@ -228,6 +228,23 @@ def _stiffer_beyond(local: LocalMotion, which: int) -> bool:
         for side in (1.0, -1.0)
     )
     return above >= below
+
+
+def stiffness_jump(state: BalanceState, element: int, index: int, tau: float) -> float:
+    """By how much the stiffness along what an element reads jumps where the motion reaches a gap at an instant; 0 where
+    it does not (a rounded corner, powers of a half).
+    """
+    local = state.local(element)
+    kind = local.kind
+    if isinstance(kind, PiecewiseLinear):
+        return float(local.coefficients[kind.pieces[index].stiffness]) * kind.pieces[index].side
+    if not isinstance(kind, CornerSampling) or kind.rough:
+        return 0.0
+    members = (pair for channel in state.own_channels for pair in channel.members())
+    law = next(law for law, member in members if member.number == element)
+    assert isinstance(law, GeneralLaw)
+    there = law.state_at(np.cos([tau]), np.sin([tau]))
+    return float(jump(law, gaps_of(law)[index], *there)[0])
 
 
 def _along(element: BaseElement) -> float:

@@ -69,6 +69,14 @@ def in_doubt(result: FloquetResult, integer: float, half: float) -> FloquetResul
     return replace(result, errors=errors)
 
 
+def neutral(result: FloquetResult) -> FloquetResult:
+    """Multipliers of which one is +1 whatever computing it left of that: its error covers the distance."""
+    distance, errors = np.abs(result.multipliers - 1.0), result.errors.copy()
+    nearest = int(np.argmin(distance))
+    errors[nearest] = max(errors[nearest], 2.0 * float(distance[nearest]))
+    return replace(result, errors=errors)
+
+
 def upper(mu: ComplexArray) -> ComplexArray:
     """The complex multipliers of the upper half plane."""
     return mu[mu.imag > _REAL * np.abs(mu)]

@@ -62,10 +62,16 @@ class CountCheck:
         # a branch that turns back at a pitchfork is its own mirror image behind it: the count does not change there
         if change <= odd + 2 * kinds.count("NS") and ("BP" in kinds or (change - odd) % 2 == 0):
             return None
+        located = ", ".join(kinds) or "none"
         reason = (
             f"the number of unstable multipliers changes from {before} to {now}, which the bifurcations located there "
-            f"({', '.join(kinds) or 'none'}) do not explain"
+            f"({located}) do not explain"
         )
+        if change == 0:
+            reason = (
+                f"as many multipliers are unstable behind as before ({now}), although each of the bifurcations located "
+                f"there ({located}) changes their number: another one may be missing"
+            )
         return last, sample, reason
 
 

@@ -21,6 +21,7 @@ from suboctave.curves.events.layer import (
 )
 from suboctave.curves.events.locate import Guess, Singular
 from suboctave.curves.events.monitors import BRANCH_POINT, BifurcationKind, Located, locate, position
+from suboctave.curves.interior import FINEST
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.sample import Sample
 from suboctave.errors import ConvergenceError
@@ -34,6 +35,9 @@ _NEWTON = NewtonOptions()
 _HALVED = 16
 #: fractions of a step beyond its ends up to which more harmonics may move a bifurcation located in it
 _MOVED = 0.05
+#: component of the unit tangent along the parameter, in scaled arclength, at both ends of the shortest interval, from
+#: which on a curve that turns in between does so in a corner: a smooth limit point would be bent by 1e3
+_ABRUPT = 1e-2
 #: slope of a branch in its parameter at a branch point, both scaled, below which it turns back there
 _STILL = 1e-5
 
@@ -57,21 +61,24 @@ def bifurcation_at(located: Located, a: Sample, b: Sample, observe: int, warning
         # harmonics may move it beyond the ends of a short step, where it may also be another one
         solution = behind if own else _with_more_harmonics(located, a, b) or behind
     if solution is None:
-        beside = grazing_beside(guess)
-        # the bracket of a grazing shows the excursion itself; across a branch point other tests change, too
-        if located.bracket is not None and (beside is None or BRANCH_POINT.changed(*located.bracket)):
-            return None
-        orbit = located.sample.orbit
+        sample, width, beside = located.sample, located.width, grazing_beside(guess)
+        why = "a law is rough there" if beside is None else f"{beside.label} grazes there"
+        # the bracket of a grazing shows the excursion itself
+        if located.bracket is not None:
+            corner = None if beside is not None else _corner(located.kind, *located.bracket)
+            # across a branch point other tests change, too
+            if (beside is None and corner is None) or BRANCH_POINT.changed(*located.bracket):
+                return None
+            if corner is not None:
+                (sample, width), why = corner, "the curve turns abruptly there, in a corner of the equations"
         # what is bracketed is the change of a test; where a contact grazes, harmonics matter beyond that
-        width = located.width if beside is None else max(located.width, abs(guess.parameter - beside.parameter))
-        warnings.append(
-            f"{located.kind.name} near {curve.where(located.sample.point.u)} could only be bracketed, "
-            f"to +- {width:.1e}: " + (f"{beside.label} grazes there" if beside else "a law is rough there")
-        )
+        width = width if beside is None else max(width, abs(guess.parameter - beside.parameter))
+        where, orbit = curve.where(sample.point.u), sample.orbit
+        warnings.append(f"{located.kind.name} near {where} could only be bracketed, to +- {width:.1e}: {why}")
         return Bifurcation(
             located.kind.name,
             orbit,
-            located.sample.floquet,
+            sample.floquet,
             orbit.residual,
             orbit.amplitude(observe),
             curve.name,
@@ -88,6 +95,22 @@ def bifurcation_at(located: Located, a: Sample, b: Sample, observe: int, warning
     share = located.fraction
     tangent = (1.0 - share) * curve.transfer(a.point.tangent, a.curve) + share * b.point.tangent
     return replace(item, tangent=tuple(curve.with_balance(item.orbit.balance).transfer(tangent, curve).tolist()))
+
+
+def _corner(kind: BifurcationKind, a: Sample, b: Sample) -> tuple[Sample, float] | None:
+    """The limit point in which a curve turns abruptly between two samples as close together as any are told apart: the
+    one nearer to it in the parameter, and how far it may lie from that. None if the slope comes to zero on the way, as
+    at a smooth one, or the two lie on different curves.
+
+    Up to the corner the curve goes on as at its ends, so that it lies no farther from either than the slope there times
+    the way to the other.
+    """
+    way = length(b.point.weights * (b.point.u - b.curve.transfer(a.point.u, a.curve)))
+    steepness = [abs(float(s.point.weights[s.point.curve.parameter])) * abs(s.slope) for s in (a, b)]
+    if kind.name != "LP" or way > FINEST or min(steepness) < _ABRUPT:
+        return None
+    nearer = min((a, b), key=lambda sample: abs(sample.slope))
+    return nearer, abs(nearer.slope) * max(way, b.place - a.place)
 
 
 def solved_bifurcation(
@@ -173,8 +196,7 @@ def _with_more_harmonics(located: Located, a: Sample, b: Sample) -> Singular | N
     if beyond is None:
         return None
     wide = located.sample.curve.with_balance(beyond.state.balance)
-    there, point = located.sample.curve.transfer(wide.u_of(beyond.state), wide), located.sample.point
-    return beyond if distance(there, point.u, point.weights) <= b.point.arclength - a.point.arclength else None
+    return beyond if _within_reach(beyond, wide, a, b) else None
 
 
 def _refined(
@@ -210,6 +232,9 @@ def _refined(
                 behind = behind_grazing(kind, guess)
                 if behind is None or not _lies_between(behind, wide, *neighbours):
                     behind = _between(kind, wide, *neighbours)
+                if behind is None and not _within_reach(better, wide, *neighbours):
+                    there = _guess_from(better, curve).parameter
+                    raise ConvergenceError(f"it leads to another one, at {curve.name} = {there:.6g}")
                 better = behind or better
         except ConvergenceError as failure:
             warnings.append(
@@ -238,6 +263,15 @@ def _lies_between(solution: Singular, curve: MotionProblem, a: Sample, b: Sample
         ends = _ends(curve, a, b)
         share = None if ends is None else position(ends[0].point, ends[1].point, there)
     return share is not None and -_MOVED <= share <= 1.0 + _MOVED
+
+
+def _within_reach(solution: Singular, curve: MotionProblem, a: Sample, b: Sample) -> bool:
+    """Whether a solution, one of the motions of `curve`, lies no farther from either of two samples than they are
+    apart: a bifurcation that harmonics move out of a short step; one farther off is another.
+    """
+    u, way = curve.u_of(solution.state), b.point.arclength - a.point.arclength
+    away = (distance(s.curve.transfer(u, curve), s.point.u, b.point.weights) for s in (a, b))
+    return min(away) <= way
 
 
 def _between(kind: BifurcationKind, curve: MotionProblem, a: Sample, b: Sample) -> Singular | None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import weakref
+from contextlib import suppress
 from functools import lru_cache
 from typing import Any
 
@@ -18,7 +19,8 @@ from suboctave.bifurcation.bordered import NullVectors, null_vectors
 from suboctave.bifurcation.gaps import GapExtrema, crossing_speeds, gap_extrema
 from suboctave.bifurcation.normal_form import cubic_coefficient, pitchfork_coefficient, responding, torus
 from suboctave.continuation.linear import Factor, LeadingBlock, length
-from suboctave.continuation.point import CurvePoint
+from suboctave.continuation.newton import NewtonOptions, closely
+from suboctave.continuation.point import CurvePoint, point_ahead, solved_again
 from suboctave.curves.kinds.branch_point import BranchPointEquations
 from suboctave.curves.kinds.extremum import ExtremalEquations
 from suboctave.curves.kinds.free_phase import FreePhaseEquations, FreePhaseOperator
@@ -30,9 +32,11 @@ from suboctave.curves.kinds.singular import SingularEquations, SingularOperator
 from suboctave.curves.motion import MotionEvaluation, MotionProblem
 from suboctave.curves.still import at_rest
 from suboctave.curves.trace import BranchPoint
+from suboctave.errors import ConvergenceError
 from suboctave.floquet.held import Grip, grip
 from suboctave.floquet.methods import Monodromy, StabilityMethod
 from suboctave.floquet.result import FloquetResult
+from suboctave.floquet.symmetric import symmetric_functions
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.energy import action_along, action_gradient
 from suboctave.harmonic.evaluation import BalanceState
@@ -47,6 +51,10 @@ Excursions = dict[int, float]
 _YOUNG = 0.05
 #: coefficient of a double multiplier, in units of omega, below which rounding has its say (an undamped structure)
 _NOTHING = 1e-9
+#: component of the unit tangent along the free parameter, in scaled arclength, up to which it may be rounding, and that
+#: up to which it may be what a point's tolerance makes of it; way to points beside one that tell a piece from a turn
+_LEVEL, _TOLERATED, _ASIDE = 1e-9, 1e-6, 1e-3
+_CLOSELY = closely(NewtonOptions())
 
 
 class Sample:
@@ -71,7 +79,7 @@ class Sample:
 
     def as_point(self, result: FloquetResult) -> BranchPoint:
         """The point with multipliers as a branch keeps it."""
-        return BranchPoint(self.orbit, result, self.place, self.point.iterations)
+        return BranchPoint(self.orbit, result, self.place, self.point.iterations, still=self.still)
 
     @property
     def where(self) -> str:
@@ -104,7 +112,13 @@ class Sample:
         """Multipliers whose errors cover what det J_0 and det J_half say of them."""
         if self.at_rest:
             return self.floquet
-        return measures.in_doubt(self.floquet, self.point.orientation * self.slope, self.half_sign)
+        result = measures.in_doubt(self.floquet, self._integer_sign, self.half_sign)
+        return measures.neutral(result) if self.still else result
+
+    @property
+    def _integer_sign(self) -> float:
+        """Sign of det J_0; 0 where that vanishes all along the curve."""
+        return 0.0 if self.still else self.point.orientation * self.slope
 
     @lazy
     def at_rest(self) -> bool:
@@ -118,7 +132,7 @@ class Sample:
         """
         count = self.floquet.unstable
         if not self.at_rest:
-            for which, _ in measures.contradicted(self.floquet, self.point.orientation * self.slope, self.half_sign):
+            for which, _ in measures.contradicted(self.floquet, self._integer_sign, self.half_sign):
                 count += 1 if abs(self.floquet.multipliers[which]) <= 1.0 else -1
         return count
 
@@ -163,10 +177,34 @@ class Sample:
         return float(self.point.tangent[self.point.curve.parameter])
 
     @lazy
+    def still(self) -> bool:
+        """Whether the free parameter stays as it is along the curve, but for rounding, and does not only turn here: J_0
+        is singular all along such a piece, which a multiplier at +1 belongs to.
+        """
+        if _turn(self.point) > _TOLERATED or self.at_rest:
+            return False
+        here, beside = self.point, [0.0]
+        with suppress(ConvergenceError):
+            here = solved_again(here, self.curve, here.weights, _CLOSELY)
+        if _turn(here) > _LEVEL:
+            return False
+        for way in (-_ASIDE, _ASIDE):
+            with suppress(ConvergenceError):
+                beside.append(_turn(point_ahead(here, way, _CLOSELY)))
+        return len(beside) > 1 and min(beside[1:]) <= _LEVEL
+
+    @lazy
     def measures(self) -> Array:
-        """turn, fold, double, torus of `bifurcation.measures`: signs and logarithms of their moduli, shape (2, 4)."""
+        """turn, fold, double, torus of `bifurcation.measures`: signs and logarithms of their moduli, shape (2, 4).
+
+        Where the parameter stands still those of the multipliers but the one at +1.
+        """
         point = self.point
-        return measures.measured(point.tangent, point.weights, point.curve.parameter, self.floquet)
+        tests = measures.measured(point.tangent, point.weights, point.curve.parameter, self.floquet)
+        if self.still:
+            tests[:, 0] = 1.0, math.log(_LEVEL)
+            tests[:, 1:] = symmetric_functions(_without(self.floquet.multipliers, 1.0 + 0.0j, several=False))
+        return tests
 
     @lazy
     def grip(self) -> Grip:
@@ -378,6 +416,12 @@ class Sample:
             matrix = np.column_stack((matrix, np.append(equations.column, [0.0, 0.0])))
         sign, size = np.linalg.slogdet(matrix / np.linalg.norm(matrix, axis=1)[:, None])
         return float(sign), float(size)
+
+
+def _turn(point: CurvePoint) -> float:
+    """Modulus of the component of the unit tangent along the free parameter, in scaled arclength."""
+    at = point.curve.parameter
+    return abs(float(point.weights[at] * point.tangent[at]))
 
 
 def _without(mu: ComplexArray, critical: complex, several: bool) -> ComplexArray:

@@ -21,7 +21,8 @@ from suboctave.progress import CurveProgress, Report
 class BranchPoint:
     """One point of a branch: orbit, multipliers, position in scaled arclength, Newton iterations.
 
-    The multipliers are computed when asked for, by `method`, unless they are `known`.
+    The multipliers are computed when asked for, by `method`, unless they are `known`. `still`: whether the branch's
+    parameter stands still along a piece about it, on which a multiplier stays at +1.
     """
 
     orbit: PeriodicOrbit
@@ -29,6 +30,7 @@ class BranchPoint:
     arclength: float
     iterations: int
     method: StabilityMethod | None = None
+    still: bool = field(default=False, kw_only=True)
 
     @lazy
     def floquet(self) -> FloquetResult:

@@ -3,7 +3,8 @@
 Along a curve every motion has multipliers from `StabilityMethod.along`. Where one of them lies within its error of the
 unit circle the verdict is open, and `StabilityMethod.settled` is asked once the curve is known. What it leaves open is
 stated, as a stretch between the nearest motions with a clear verdict, unless a bifurcation located beside the motion
-is the reason: there a multiplier has to be on the circle.
+is the reason: there a multiplier has to be on the circle. Where the parameter stands still one is on it all along a
+piece, which is said instead.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ def with_verdicts(trace: Trace, method: StabilityMethod, name: str) -> Trace:
     events = [_at_event(item, asking) for item in trace.events]
     if asking.interruption is not None:
         trace.ends(Ending.stopped(asking.interruption, "its end, before open verdicts on stability were settled"))
-    in_doubt = [i for i, p in enumerate(points) if not p.floquet.decided]
+    in_doubt = [i for i, p in enumerate(points) if not (p.floquet.decided or p.still)]
     # a branch that leaves or meets another does so with a multiplier at +1
     ends = [replace(item, kind="BP") for item in (trace.departs, trace.arrives) if item is not None]
     known = [*bifurcations, *ends]
@@ -60,14 +61,14 @@ def with_verdicts(trace: Trace, method: StabilityMethod, name: str) -> Trace:
     ]
     unsettled, notes = _stretches(points, open_ones, name)
     for probe in trace.open:
-        stretch = _between(probe, points, known, name, trace.closed)
+        stretch = None if probe.still else _between(probe, points, known, name, trace.closed)
         if stretch is None:
             continue
         first, last = stretch.arclength
         if not any(first <= u.arclength[1] and u.arclength[0] <= last for u in (*trace.audit.unsettled, *unsettled)):
             unsettled.append(stretch)
     notes += [note for item in bifurcations if (note := _doubt_beside(item, bifurcations)) is not None]
-    notes += _replaced(points, method, name)
+    notes += [*_standing(points, name), *_replaced(points, method, name)]
     return replace(
         trace,
         points=points,
@@ -106,7 +107,7 @@ def _settled(points: Sequence[BranchPoint], asking: _Asking, beside: set[int]) -
         result = point.floquet
         if result.decided:
             in_vain = 0
-        elif number not in beside and in_vain < _PATIENCE:
+        elif number not in beside and not point.still and in_vain < _PATIENCE:
             result = asking.answer(point.orbit.state(), result)
             in_vain = 0 if result.decided else in_vain + 1
         settled.append(point if result is point.floquet else replace(point, known=result))
@@ -222,6 +223,23 @@ def _worst(result: FloquetResult) -> str:
 
 def _stretch(a: BranchPoint, b: BranchPoint, name: str, reason: str) -> Unsettled:
     return Unsettled(name, _value(a, name), _value(b, name), (a.arclength, b.arclength), reason)
+
+
+def _standing(points: Sequence[BranchPoint], name: str) -> list[str]:
+    """One sentence for each piece along which the parameter stands still: a linear equation has a multiple of every
+    motion, up to the one whose contacts begin or cease to touch.
+    """
+    notes = []
+    for first, last in _runs([i for i, point in enumerate(points) if point.still]):
+        here = _value(points[first], name)
+        around = [_value(points[i], name) - here for i in (first - 1, last + 1) if 0 <= i < len(points)]
+        turns = ", and the branch turns back across it" if len(around) > 1 and around[0] * around[1] > 0.0 else ""
+        notes.append(
+            f"{name} stands still at {here:.9g} along a piece of the branch: motions of every size between those at "
+            f"its ends exist there, as of linear equations, with a multiplier that stays +1; no limit point lies on "
+            f"it{turns}"
+        )
+    return notes
 
 
 def _replaced(points: Sequence[BranchPoint], method: StabilityMethod, name: str) -> list[str]:

@@ -22,13 +22,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 
 from suboctave.bifurcation.bifurcation import CONTACT_KINDS, Bifurcation
 from suboctave.bifurcation.bordered import bordered
-from suboctave.bifurcation.gaps import GrazingContact, gap_extrema
+from suboctave.bifurcation.gaps import GrazingContact, gap_extrema, height_at, stiffness_jump
 from suboctave.continuation.linear import Factor
 from suboctave.continuation.newton import correct
 from suboctave.curves.events.grazings import Grazing, Touch
@@ -39,7 +40,6 @@ from suboctave.errors import ConvergenceError
 from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.truncation import motion_size
-from suboctave.model.elements.smoothness import PiecewiseLinear
 
 #: exponent of the test function's path from the grazing below which it counts as a square root (1/2; smooth: 1)
 _SQUARE_ROOT = 0.75
@@ -83,8 +83,7 @@ def behind_grazing(kind: BifurcationKind, guess: Guess) -> Singular | None:
                 solution = kind.solve(start)
             except ConvergenceError:
                 continue
-            way = float(np.linalg.norm(_chord(grazing.state, solution.state, guess)))
-            if kind.genuine(solution, start) and way <= _REACH:
+            if kind.genuine(solution, start) and not _far(solution, replace(guess, state=grazing.state)):
                 return solution
     return None
 
@@ -119,9 +118,13 @@ def unresolved(
         fewer, state = other.harmonics, guess.state
         x = basis.resized(state.x, other)
         balance = state.balance.with_basis(other).settle(x, state.omega, state.values)
-        try:
-            there = solve_or_behind(kind, replace(guess, state=balance.at(x, state.omega, state.values)))
-        except ConvergenceError:
+        start = replace(guess, state=balance.at(x, state.omega, state.values))
+        there: Singular | None = None
+        with suppress(ConvergenceError):
+            there = solve_or_behind(kind, start)
+        if there is not None and _far(there, start):
+            there = behind_grazing(kind, start)
+        if there is None:
             return abs(guess.parameter - contact.parameter)
         value = guess.value(there.state)
     return abs(value - guess.parameter) / (basis.harmonics / fewer - 1.0)
@@ -183,19 +186,20 @@ def _grazings_near(guess: Guess, young: bool) -> Iterator[tuple[Touch, Grazing, 
     state = guess.state
     mass = state.linear.equation_of_motion()[0]
     for gap in gap_extrema(state):
-        local = state.local(gap.element)
-        kind = local.kind
-        if not isinstance(kind, PiecewiseLinear):
-            continue
-        direction = state.linear.retain(local.element.direction(state.balance.system.n))
-        expanded = state.linear.expand(direction)
-        mobility = float(expanded @ np.linalg.solve(mass, expanded))
-        stiffness = abs(float(local.coefficients[kind.pieces[gap.index].stiffness]))
+        acting = state.linear.expand(
+            state.linear.retain(state.local(gap.element).element.direction(state.balance.system.n))
+        )
         size = float(np.abs(gap.value).max(initial=0.0))
         for tau, value, curve in zip(gap.tau, gap.value, gap.curve, strict=True):
             beyond = value - gap.level
             if curve == 0.0 or abs(beyond) > _NEAR * size:
                 continue
+            stiffness = abs(stiffness_jump(state, gap.element, gap.index, float(tau)))
+            if stiffness == 0.0:
+                continue
+            # the first basis function is one
+            read = state.linear.expand(height_at(state, gap.element, gap.index, float(tau)).by_x[0])
+            mobility = abs(float(read @ np.linalg.solve(mass, acting)))
             force = stiffness * mobility * abs(beyond / curve) / state.rate**2
             if young and (beyond * curve > 0.0 or force > _YOUNG):
                 continue
@@ -216,6 +220,11 @@ def _weights(state: BalanceState, guess: Guess) -> Array:
 def _chord(a: BalanceState, b: BalanceState, guess: Guess) -> Array:
     """From one motion to another, scaled."""
     return _weights(b, guess) * (guess.vector(b) - guess.vector(a))
+
+
+def _far(solution: Singular, start: Guess) -> bool:
+    """Whether a solution lies farther from its start than one that belongs to a grazing there."""
+    return float(np.linalg.norm(_chord(start.state, solution.state, start))) > _REACH
 
 
 def _exponent(kind: BifurcationKind, solution: Singular, grazing: Grazing, guess: Guess) -> float:

@@ -3,7 +3,7 @@
 A new kind is one class here (or in a file of its own) with four answers: how often it may have happened between two
 neighbours, where in between, how to solve for it, and whether a solution is one.
 
-- LP: the component of the tangent along the free parameter changes sign;
+- LP: the component of the tangent along the free parameter changes sign, and does not vanish along a piece;
 - BP: the bordered determinant `det [R_X R_omega; t]` changes sign, the branch going straight on;
 - PD: det J_half changes sign;
 - NS: complex pairs of multipliers cross the unit circle, by the number of those outside, or by that of all multipliers
@@ -111,7 +111,8 @@ class LimitPoint(BifurcationKind):
     operator = Kind.INTEGER
 
     def changed(self, a: Sample, b: Sample) -> bool:
-        return (a.slope > 0.0) != (b.slope > 0.0)
+        # where the parameter stands still the sign of its slope is rounding
+        return (a.slope > 0.0) != (b.slope > 0.0) and not (a.still or b.still)
 
     def fraction(self, a: Sample, b: Sample) -> float:
         return _zero(a.slope, b.slope)

@@ -1,0 +1,35 @@
+"""Limit points in which a curve turns abruptly, of laws whose corners are no gap of one displacement."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import suboctave as so
+
+
+@pytest.mark.parametrize("me", [0.07, 0.1])
+def test_a_rotor_that_meets_its_stator_jumps_where_the_orbit_reaches_the_clearance(me):
+    """Circular orbits: r sqrt((1 - w^2)^2 + (c w)^2) = me w^2, a closed form for w at r = clearance = 0.2, c = 0.1."""
+    squares = np.roots([1.0 - (me / 0.2) ** 2, 0.1**2 - 2.0, 1.0])
+    touch = np.sqrt(squares.max())
+    curve = so.frequency_response(so.library.jeffcott_rotor(me=me), (8.0, touch - 0.1), 5)
+    (fold,) = (b for b in curve.bifurcations["LP"] if abs(b.omega - touch) < 0.01)
+    assert 0.0 < fold.uncertainty < 1e-7
+    assert abs(fold.omega - touch) <= fold.uncertainty
+    assert fold.amplitude == pytest.approx(0.2, rel=1e-6)
+    assert fold.residual < 1e-9
+    assert fold.normal_form is None
+    at = np.searchsorted(curve.arclength, fold.arclength)
+    assert curve.stable[at - 2]
+    assert not curve.stable[at + 2]
+    assert any("turns abruptly there, in a corner" in note for note in curve.warnings)
+    assert not any("could not be located" in note for note in curve.warnings)
+
+
+def test_a_sharp_fold_of_a_smooth_law_is_no_corner():
+    """As sharp as arctan steps of the stiffness make it: solved, not bracketed."""
+    stop = so.ElasticStop(0, 200.0, 5.0, regularization=1e4)
+    curve = so.frequency_response(so.System(1.0, 0.1, 1.0, [stop], [so.HarmonicLoad(0, 1.0)]), (1.3, 1.0), 9)
+    assert curve.bifurcations["LP"]
+    assert all(fold.uncertainty == 0.0 for fold in curve.bifurcations["LP"])
