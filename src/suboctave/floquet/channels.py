@@ -33,8 +33,8 @@ _CORRECTED = 3
 _NOTHING = Probe()
 #: a channel without motion reaches none of these
 _UNREACHED = np.array([[0.0, -1.0, 1.0], [0.0, 1.0, 1.0]])
-#: and how far in tau their marks may be apart
-_WIDEST = 1e-4
+#: and how far in tau their marks may be apart; those of any corner are closer than the latter
+_WIDEST, _LONGEST = 1e-4, 1e-3
 
 
 class _Marked(NamedTuple):
@@ -184,13 +184,10 @@ class Channels:
                     i, j = p * (ORDER - 1), (last + 1) * (ORDER - 1)
                     here = surface_at(nodal, marked.corners[0], q[:, i : i + 1], theta[i : i + 1])
                     normal, jumps = here.normal[:, 0], f_q[:, j] - f_q[:, i]
-                    # how fast the function that vanishes there passes
-                    rate = (
-                        path[marked.channel, 1, i] + normal[: nodal.count] @ change[begin : begin + nodal.count, 1, i]
-                    )
-                    if rate == 0.0 or not jumps.any():
+                    passing = rate + normal[: nodal.count] @ change[begin : begin + nodal.count, 1, i]
+                    if passing == 0.0 or not jumps.any():
                         continue
-                    later, length = -(normal @ d[:, i]) / rate, 2.0 * spans[p, 0]
+                    later, length = -(normal @ d[:, i]) / passing, 2.0 * spans[p, 0]
                     impulses = np.multiply.outer(jumps, -1.5 * later / length * (1.0 - NODES**2))
                     self._put(nodal, begin, scale, impulses, law[:, :, i : i + ORDER])
 
@@ -219,20 +216,25 @@ class Channels:
         if not self._sliced:
             return
         first = np.searchsorted(owner, np.arange(self.first + len(self.motions)))
-        pieces = events[:, 5].astype(int)
+        pieces = events[:, 5].astype(int).tolist()
         for i, piece in enumerate(pieces):
-            follow = (i + 1) % len(pieces)
-            if pieces[follow] < 0:  # a passage between the marks
-                follow = (follow + 1) % len(pieces)
-            if piece < 0 or owner[piece] < self.first or pieces[follow] < 0 or follow == i:
+            if piece < 0 or owner[piece] < self.first:
                 continue
             channel = int(owner[piece])
-            own, other = piece - first[channel], pieces[follow] - first[channel]
-            apart = (events[follow, 0] - events[i, 0]) % (2.0 * math.pi)
-            if owner[pieces[follow]] == channel and own // 2 == other // 2 and own != other and 0.0 < apart < 1e-3:
-                last = int(start[follow]) - 1 if start[follow] > start[i] else panels - 1
-                rate = self.state.rate * float(events[i, 2])
-                self._slices.setdefault(channel, []).append((int(start[i]), last, rate))
+            # the other mark of the corner: another element may have its own there, and passages lie between
+            other = first[channel] + ((piece - first[channel]) ^ 1)
+            for k in range(i + 1, i + len(pieces)):
+                follow = k % len(pieces)
+                apart = (events[follow, 0] - events[i, 0]) % (2.0 * math.pi)
+                if apart >= _LONGEST:
+                    break
+                if pieces[follow] == other and apart > 0.0:
+                    last = int(start[follow]) - 1 if start[follow] > start[i] else panels - 1
+                    rate = self.state.rate * float(events[i, 2])
+                    self._slices.setdefault(channel, []).append((int(start[i]), last, rate))
+                    break
+                if owner[pieces[follow]] == channel and pieces[follow] >= 0:
+                    break
 
 
 def _inputs(nodal: GeneralLaw, begin: int, path: Array) -> Array:
