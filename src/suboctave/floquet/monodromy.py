@@ -13,15 +13,8 @@ to the errors, the more the less multipliers are apart. So does the share of the
 make. Perturbations that decay while no channel acts need not be followed either: the period begins with the longest
 such time.
 
-Here r is the force that the motion leaves unbalanced. All elements along one direction are one channel. An element with
-nodes of its own (`aft.general`), of force f(q, theta) along d_out, adds `d_out (f_ui d_i^T y + f_vi d_i^T y')` per
-input: one channel each, with its own direction to the left and to the right. Channels without force make panels follow
-what such a law follows (a corner in velocity, a sharp law in velocity), and give the time at the nodes.
-
-Laws that their smoothness class is all of are evaluated in compiled code. All other elements give their tangents at all
-nodes at once, along the motion as it stands and, where it is corrected by `d(tau)`, again; but for sharp laws `f_u +
-f_uu d + f_uv d'` is taken at the old nodes. Panels are graded towards the old passages, and where d exceeds the law's
-width the new ones lie between the nodes; the linear form has the right integral all the same.
+Here r is the force that the motion leaves unbalanced. All elements along one direction are one channel. Laws that their
+smoothness class is all of are evaluated in compiled code, all others at all nodes at once (`channels`).
 
 A motion of H harmonics is not quite the true one: it leaves the force `r = sum d (f - P_H f)` unbalanced, P_H f the
 part of the element forces within the basis. One step of Newton's method among periodic functions (Kantorovich),
@@ -32,9 +25,14 @@ whose propagator is at hand, gives what the motion lacks: harmonics beyond H wit
 in those within. The multipliers are those of the motion so corrected, with an error of second order. How far they are
 from those of the motion as it stands, propagated with fewer digits, is their error estimate: it covers what is left
 many times over, and it also covers how far other discretisations of the motion, such as Hill's determinant, may differ.
+It is at least the distance to the nearest of those: multipliers that meet on their way go farther than the first order
+says. A step that moves the motion along a channel by more than a share of it, and the channel's stiffness or damping
+by more than that share, is cut down to it. At a channel at rest rounding is many times the motion, and a step of that
+size does nothing to the law.
 
-At a limit point there is no such step: a motion of the same frequency is far away, or there is none. What the step
-moves along the direction of the multiplier near +1 is then left out, and belongs to the error: with the gap
+At a limit point, which the multipliers of the motion as it stands tell, there is no such step: a motion of the same
+frequency is far away, or there is none. What the step moves along the direction of the multiplier near +1 is then left
+out, and belongs to the error: with the gap
 `g = 1 - mu` and the shift D of the multiplier to first order, the motions near a fold leave `g^2 - 2 g D` for the
 square of the gap, so that the shift is at most about `sqrt(2 g |D|)`.
 
@@ -51,6 +49,7 @@ import scipy.linalg
 from scipy.linalg import lapack
 
 from suboctave.floquet.blocks import form_of, forms_along, in_blocks
+from suboctave.floquet.channels import BLIND, Channels
 from suboctave.floquet.exponentials import TURNS, structure
 from suboctave.floquet.propagate import closed, march, multipliers_and_shifts, response
 from suboctave.floquet.resolution import (
@@ -64,7 +63,6 @@ from suboctave.floquet.resolution import (
 from suboctave.floquet.result import FloquetResult
 from suboctave.floquet.structural import with_structural_damping
 from suboctave.floquet.time_mesh import (
-    NODES,
     ORDER,
     along_panels,
     changed_laws,
@@ -72,14 +70,12 @@ from suboctave.floquet.time_mesh import (
     longest_panel,
     panels_between,
 )
-from suboctave.harmonic.aft.channel import Channel
-from suboctave.harmonic.aft.closed_form import NO_ROWS
-from suboctave.harmonic.aft.general import GeneralLaw, Smoothness
-from suboctave.harmonic.aft.table import PackedLaws, Probe
+from suboctave.harmonic.aft.table import PackedLaws
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.quadrature import search_grid, singular_instants
 from suboctave.interruption import check_time
+from suboctave.lazy import lazy
 
 #: how far blocks without states may move multipliers, and how much further where a force is left unbalanced altogether,
 #: which does more
@@ -91,14 +87,8 @@ _LENGTHS = (1.2, 1.8, TURNS, 1.0 / 12.0)
 _FORGOTTEN = math.log(1e-14)
 #: how often panels are made shorter, as what is seen between their nodes needs it
 _DIVIDED = 6
-#: nodes per period of a law of unknown smoothness, in units of panels of one radian; phase of a tangent over a panel
-_BLIND, _TANGENT = 48.0, 7.0
-#: width of the slices that are cut out around corners, in units of the motion
-_SLICE = 1e-9
-#: how close to a corner where powers of a half begin panels are graded, in units of the motion
-_ROUGH = 1e-6
+_TINY = float(np.finfo(float).tiny)
 _NO_PASSAGES = np.zeros((2, 0))
-_NOTHING = Probe()
 _NO_MULTIPLIERS = np.empty(0, dtype=complex), np.empty(0)
 
 
@@ -142,7 +132,7 @@ class _Linearised:
         longest = min(longest_panel(self._motions, degree), own.finest)
         self._kinked = laws.unknown_samples > 0 or own.unknown
         if laws.unknown_samples:
-            longest = min(longest, _BLIND / laws.unknown_samples)
+            longest = min(longest, BLIND / laws.unknown_samples)
         grid = search_grid(state.basis.harmonics)
         # singularities further away than the longest panel do not disturb it
         passed = [
@@ -254,6 +244,12 @@ class _Linearised:
         self._own.changed(self.path, change, law, self.spans)
         return law, kick
 
+    @lazy
+    def standing(self) -> ComplexArray:
+        """Multipliers along the motion as it stands, (size,)."""
+        real, imaginary, *_ = lapack.dgeev(self.before, 0, 0)
+        return real + 1j * imaginary
+
     @property
     def rounding(self) -> float:
         """Relative errors of multipliers due to eigenvectors that are nearly parallel."""
@@ -301,10 +297,13 @@ class _Linearised:
                 start = self._still()
             elif weight < 1.0:
                 start = start - (1.0 - weight) * (projector(self.before) @ start)
-            share = response(
+            excess = response(
                 self._structures, self._stretch, self._forms, self.active, self._acting, self._solved, self._states,
                 start, self._whole, self._kept, self.path, _LARGEST, change,
             )  # fmt: skip
+            if excess > 1.0:
+                share = self._share(change)
+                change = share * change if share > 0.0 else np.zeros_like(change)
         law, kick = self._changed(change)
         after = self._march(law, kick, self.size)[self._kept]
         mu, shift = np.empty(self.size, dtype=complex), np.empty((2, self.size))
@@ -312,7 +311,30 @@ class _Linearised:
         multipliers_and_shifts(
             real, imaginary, left, right, after, self.before, self.neglected, self._doubt(change, share), mu, shift
         )
+        # where multipliers meet on their way the first order tells too little: each has at least come from the nearest
+        np.maximum(shift[0], np.abs(mu[:, None] - self.standing).min(axis=1), out=shift[0])
         return mu, shift, share
+
+    def _share(self, change: Array) -> float:
+        """The share of a correction (C, 2, N) with which none moves the motion along a channel by more than `_LARGEST`
+        of it, or its stiffness and damping by as much of theirs, whichever allows more: what is added to a channel at
+        rest may be many times its motion and mean nothing to its law. One that is not finite is left out.
+        """
+        if not np.isfinite(change).all():
+            return 0.0
+        after, kick = self._changed(change)
+        worst = 1.0
+        for g in self.active.tolist():
+            most, motion = (float(np.abs(part[g, 0]).max()) for part in (change, self.path))
+            if most <= _LARGEST * motion:
+                continue
+            own = self._own.together(g)
+            turned = math.inf if kick[own].any() else 0.0
+            for old, new in ((self.law[own, part], after[own, part]) for part in (1, 2)):
+                if (new != old).any():
+                    turned = max(turned, float(np.abs(new - old).max() / max(np.abs(old).max(), _TINY)))
+            worst = max(worst, min(most / max(motion, _TINY), turned) / _LARGEST)
+        return 1.0 / worst
 
     def _doubt(self, change: Array, share: float) -> float:
         """Share of a correction that blocks without states make, as springs, of forces that turn faster than these."""
@@ -321,196 +343,10 @@ class _Linearised:
         return min(1.0, alone / size) if size > 0.0 else 0.0
 
 
-class Channels:
-    """Laws that are asked at nodes, and the channels of elements with nodes of their own, after those of the groups.
-
-    Attributes
-    ----------
-    first
-        Number of groups.
-    motions, forces
-        Displacement and Fourier coefficients of the force of every channel of their own, lists of (H + 1,) and
-        (top + 1,).
-    numbers
-        The channel of every input of these elements.
-    probes
-        What panels follow along these channels.
-    degree, finest
-        Degree of the tangents as polynomials in the motion; longest panel that they allow.
-    unknown
-        Whether a law may be anything.
-    """
-
-    def __init__(self, state: BalanceState) -> None:
-        self.state, self.first = state, len(state.balance.groups)
-        self.motions: list[ComplexArray] = []
-        self.forces: list[ComplexArray] = []
-        self.numbers: list[int] = []
-        self.probes: list[Probe] = []
-        self.degree, self.finest, self.unknown = 0, math.inf, False
-        #: every law, the channel of its first input, and what its forces along every input are multiplied by
-        self._laws: list[tuple[GeneralLaw, int, Array]] = []
-        self._tangents: list[Array] = []
-        #: channels with marks of corners, by the first channel of their element; first and last panel between marks,
-        #: by channel
-        self._sliced: dict[int, list[tuple[int, int]]] = {}
-        self._slices: dict[int, list[tuple[int, int]]] = {}
-        self._clock = -1
-        if not state.packed.whole:
-            for g, channel in enumerate(state.channels[: self.first]):
-                own = [law for law in channel.laws if isinstance(law, GeneralLaw)]
-                self._laws += [(law, g, np.ones(1)) for law in own]
-        for channel in state.own_channels if state.balance.own else ():
-            self._add(channel)
-        if any(law.harmonic for law, _, _ in self._laws):
-            turning = np.zeros(state.basis.harmonics + 1, dtype=complex)
-            turning[1] = 1.0
-            self._clock = self._channel(turning)
-
-    def _channel(self, motion: ComplexArray, probe: Probe = _NOTHING) -> int:
-        self.motions.append(motion)
-        self.forces.append(np.zeros(self.state.balance.top + 1, dtype=complex))
-        self.probes.append(probe)
-        return self.first + len(self.motions) - 1
-
-    def _add(self, own: Channel) -> None:
-        (nodal,) = own.laws
-        assert isinstance(nodal, GeneralLaw)
-        along, law = nodal.along, nodal.smoothness
-        scale = np.ones(own.count)
-        begin = len(self.motions)
-        for i, (d, motion) in enumerate(zip(own.ins, along.motions, strict=True)):
-            if len(d) == 1:
-                # see `blocks.in_blocks`
-                scale[i] = own.out[0] / d[0]
-            self.numbers.append(self._channel(motion, _probe(law, law.points if i == 0 else (), motion)))
-            if i == 0 and law.points:
-                self._sliced.setdefault(self.first + begin, []).append((self.first + begin, 0))
-        self.forces[begin] = scale[0] * own.spectra[0]
-        self._laws.append((nodal, self.first + begin, scale))
-        velocity = 1j * along.rate * np.arange(len(along.motions[0])) * along.motions[0]
-        if law.velocities and velocity.any():
-            probe = self._channel(velocity, _probe(law, law.velocities, velocity))
-            self._sliced.setdefault(self.first + begin, []).append((probe, 1))
-        if law.sharp_velocities[0] and velocity.any():
-            self._channel(velocity, Probe(NO_ROWS, *law.sharp_velocities))
-        degree = max(1, law.degree - 1)
-        self.degree = max(self.degree, degree)
-        self.unknown = self.unknown or law.unknown
-        if law.cornered or law.unknown:
-            self.finest = min(self.finest, _BLIND / nodal.samples)
-        if nodal.harmonic:
-            varying = nodal.harmonic * nodal.along.nu + degree * nodal.along.high
-            self.finest = min(self.finest, _TANGENT / varying)
-
-    def _state(self, nodal: GeneralLaw, begin: int, path: Array) -> tuple[Array, Array]:
-        """q (Q, N) and theta (N,) of an element at the nodes of the panels."""
-        q = _inputs(nodal, begin, path)
-        if self._clock < 0 or not nodal.harmonic:
-            return np.ascontiguousarray(q), np.zeros(q.shape[1])
-        cosine, slope = path[self._clock]
-        return np.ascontiguousarray(q), nodal.along.nu * np.arctan2(-slope / nodal.along.rate, cosine)
-
-    def evaluate(self, path: Array, law: Array) -> None:
-        """Add force, stiffness and damping along the path (G, 2, N) to `law` (G, >= 3, N)."""
-        self._tangents = []
-        for nodal, begin, scale in self._laws:
-            q, theta = self._state(nodal, begin, path)
-            force, f_q = nodal.tangent(q, theta)
-            law[begin, 0] += scale[0] * force
-            self._tangents.append(f_q)
-            self._put(nodal, begin, scale, f_q, law)
-
-    def _put(self, nodal: GeneralLaw, begin: int, scale: Array, f_q: Array, law: Array) -> None:
-        """Add a tangent (Q, N) to stiffness and damping in `law` (G, >= 3, N)."""
-        count = nodal.count
-        for i in range(count):
-            law[begin + i, 1] += scale[i] * f_q[i]
-            if nodal.moving:
-                law[begin + i, 2] += scale[i] * f_q[count + i]
-
-    def changed(self, path: Array, change: Array, law: Array, spans: Array) -> None:
-        """Add stiffness and damping along the path changed by `change` to `law` (G, 3, N).
-
-        Of laws with corners every node keeps its side. For the time by which the motion reaches a corner later the law
-        before it stays: an impulse, put into the slice that was cut out there.
-        """
-        for (nodal, begin, scale), f_q in zip(self._laws, self._tangents, strict=True):
-            q, theta = self._state(nodal, begin, path)
-            d = _inputs(nodal, begin, change)
-            if nodal.smoothness.sharp:
-                new = f_q + np.einsum("rsn,sn->rn", nodal.curvature(q, theta), d)
-            else:
-                new = nodal.tangent(_moved(nodal, q, d), theta)[1]
-            self._put(nodal, begin, scale, new, law)
-            for channel, order in self._sliced.get(begin, ()):
-                row = order * nodal.count
-                for p, last in self._slices.get(channel, ()):
-                    i, j = p * (ORDER - 1), (last + 1) * (ORDER - 1)
-                    # of the displacement, or of the velocity
-                    slope = path[channel, 1, i] + (change[begin, 1, i] if order == 0 else 0.0)
-                    jump = f_q[row, j] - f_q[row, i]
-                    if slope == 0.0 or jump == 0.0:
-                        continue
-                    later = -change[begin, order, i] / slope
-                    length = 2.0 * spans[p, 0]
-                    bump = 1.5 * scale[0] * jump * later / length * (1.0 - NODES**2)
-                    law[begin, 1 + order, i : i + ORDER] -= bump
-
-    def locate(self, events: Array, start: np.ndarray, owner: np.ndarray, panels: int) -> None:
-        """Find the slices around corners: panels between the two marks of one corner.
-
-        events, start, owner: see `time_mesh.events_along` and `panels_between`; panels: how many there are.
-        """
-        if not self._sliced:
-            return
-        first = np.searchsorted(owner, np.arange(self.first + len(self.motions)))
-        pieces = events[:, 5].astype(int)
-        for i, piece in enumerate(pieces):
-            follow = (i + 1) % len(pieces)
-            if pieces[follow] < 0:  # a passage between the marks
-                follow = (follow + 1) % len(pieces)
-            if piece < 0 or owner[piece] < self.first or pieces[follow] < 0 or follow == i:
-                continue
-            channel = int(owner[piece])
-            own, other = piece - first[channel], pieces[follow] - first[channel]
-            apart = (events[follow, 0] - events[i, 0]) % (2.0 * math.pi)
-            if owner[pieces[follow]] == channel and own // 2 == other // 2 and own != other and 0.0 < apart < 1e-3:
-                last = int(start[follow]) - 1 if start[follow] > start[i] else panels - 1
-                self._slices.setdefault(channel, []).append((int(start[i]), last))
-
-
-def _inputs(nodal: GeneralLaw, begin: int, path: Array) -> Array:
-    """Displacements and, if a law reads them, velocities of its inputs, (Q, N), of all channels' (G, 2, N)."""
-    rows = path[begin : begin + nodal.count]
-    return np.concatenate((rows[:, 0], rows[:, 1])) if nodal.moving else rows[:, 0]
-
-
-def _moved(nodal: GeneralLaw, q: Array, d: Array) -> Array:
-    """The states `q + d`, which stay on their sides of all corners."""
-    moved, law = q + d, nodal.smoothness
-    for row, levels in ((0, law.points), (nodal.count, law.velocities)):
-        for level in levels:
-            near = _SLICE * max(float(np.abs(q[row]).max()), np.finfo(float).tiny)
-            above = np.maximum(moved[row], level + near)
-            moved[row] = np.where(q[row] > level, above, np.minimum(moved[row], level - near))
-    return moved
-
-
-def _probe(law: Smoothness, levels: tuple[float, ...], motion: ComplexArray) -> Probe:
-    """Panels end where the motion crosses pieces without stiffness, just before and just after corners; towards rough
-    ones they are graded, as towards a law that is sharp there.
-    """
-    size = float(np.abs(motion).max())
-    near = _SLICE * 2.0 * size
-    pieces = [(0.0, level + side * near, 1.0) for level in levels for side in (-1.0, 1.0)]
-    rough = levels if law.rough else ()
-    return Probe(np.array(pieces).reshape(-1, 3), rough, [_ROUGH * size] * len(rough))
-
-
 #: singular value of `1 - monodromy`, as a share of the largest, of a direction that is left as it is
 _SHIFTED = 1e-6
-#: a correction larger than this share of the motion is cut down to it
+#: a correction that moves a channel's motion, and its stiffness or damping, by more than this share of them is cut
+#: down to it
 _LARGEST = 0.1
 #: shift of a multiplier in units of its distance to +1 that leaves doubt whether the first order tells it
 _DOUBTFUL = 0.1
@@ -545,15 +381,13 @@ def _of_equation(state: BalanceState) -> FloquetResult:
 def _with_states(motion: _Linearised) -> tuple[ComplexArray, Array]:
     """Multipliers and errors of the blocks that have states."""
     mu, shift, share = motion.multipliers(1.0)
-    # there are few: numbers are quicker than arrays
-    values, shifts = mu.tolist(), shift[0].tolist()
-    largest = max(1.0, abs(values[0]))
-    # that nearest to +1 before the correction, which may have carried it off
-    nearest = min(range(len(values)), key=lambda i: abs(1.0 - values[i]) - shifts[i])
-    distance = abs(1.0 - values[nearest])
-    moved = shifts[nearest] / share if share > 0.0 else math.inf
-    if motion.state.driven and moved > _DOUBTFUL * distance:
-        mu, shift, share = _beside_fold(motion, moved)
+    largest = max(1.0, abs(mu[0]))
+    # that nearest to +1 is the motion's as it stands: a correction may have carried it off, to meet another one
+    nearest = motion.standing[np.abs(1.0 - motion.standing).argmin()]
+    gap = abs(1.0 - nearest)
+    moved = shift[0, np.abs(mu - nearest).argmin()] / share if share > 0.0 else math.inf
+    if motion.state.driven and moved > _DOUBTFUL * gap:
+        mu, shift, share = _beside_fold(motion, gap, moved)
     # where the correction had to be cut, the motion is not near enough to a true one to say much
     cut = 1.0 / share - 1.0 if share > 0.0 else math.inf
     least = (ACCURACY if motion.coupled else 0.0) + motion.rounding + cut
@@ -570,12 +404,12 @@ def _no_numbers(state: BalanceState, count: int) -> FloquetResult:
     return FloquetResult.inapplicable(count, "monodromy", "The linearised motion is not finite")
 
 
-def _beside_fold(motion: _Linearised, moved: float) -> tuple[ComplexArray, Array, float]:
+def _beside_fold(motion: _Linearised, gap: float, moved: float) -> tuple[ComplexArray, Array, float]:
     """Multipliers, shifts and share where a correction may have no meaning, as it does at a limit point.
 
-    moved: shift of the multiplier nearest to +1 by the whole correction.
+    gap: distance to +1 of the multiplier nearest to it along the motion as it stands; moved: its shift by the whole
+    correction.
     """
-    gap = float(np.abs(1.0 - np.linalg.eigvals(motion.before)).min())
     ratio = 2.0 * moved / gap if gap > 0.0 else math.inf
     mu, shift, share = motion.multipliers(1.0 / (1.0 + min(ratio, 1e6) ** 4))
     left_out = moved * min(1.0, 2.0 / math.sqrt(ratio)) if math.isfinite(moved) else math.inf
