@@ -5,10 +5,13 @@ x_i'' + 0.02 x_i' + x_i + 0.5 x_i^3 + 0.02 (x_i - x_j) + limit tanh((x_i' - x_j'
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import suboctave as so
+from suboctave.floquet.result import FloquetResult
 from suboctave.timedomain import shoot
 
 
@@ -47,6 +50,24 @@ def test_at_a_limit_point_all_multipliers_are_within_their_errors(folds):
             assert abs(mu - true).min() <= error
         assert abs(fold.multipliers - 1.0).min() < 1e-3
         assert fold.critical_error < 0.02
+
+
+def test_a_motion_right_at_a_limit_point_is_held_against_the_curve(folds):
+    """Of the same frequency there is no true motion, or one as far away as the square root of what they differ by."""
+    for fold in folds:
+        check = so.verify(fold.orbit)
+        assert check.outcome in ("agrees", "cannot tell"), check
+        assert check.distance < 1e-4
+        assert abs(check.solution.omega / fold.omega - 1.0) < 1e-4
+
+
+def test_multipliers_that_are_not_those_of_shooting_are_spoken_of(folds):
+    fold = folds[-1]
+    wrong = FloquetResult(fold.multipliers + 0.1, fold.floquet.errors)
+    check = so.verify(replace(fold, floquet=wrong))
+    assert check.agrees
+    assert "its multipliers are others" in check.reason
+    assert "its multipliers are others" not in so.verify(fold).reason
 
 
 def test_an_idle_damper_leaves_no_doubt():
