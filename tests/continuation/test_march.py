@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from suboctave.continuation import CurvePoint, Event, March, NewtonOptions, SteppingOptions
+from suboctave.continuation.ending import EndReason
 from suboctave.continuation.events import Bracket
 from suboctave.continuation.linear import Factor
+from suboctave.continuation.march import Place
 from suboctave.continuation.newton import correct
 from suboctave.continuation.point import between, make_point, point_between
 from suboctave.curves.events.monitors import position
@@ -401,3 +403,93 @@ def test_a_point_far_beside_a_step_lies_on_no_part_of_it():
     for distance in (2.0, 1e3, 1e6):
         assert position(a, b, np.array([1.0, distance])) is None
         assert position(a, b, np.array([1.0, -distance])) is None
+
+
+@dataclass
+class Hairpin(Plane):
+    """`p = x^2 / (2 r)`, a hairpin of radius r; where it is `wide` the curve lies beside it and there is a further
+    unknown, which is zero.
+    """
+
+    wide: bool = False
+    beside: float = 0.0
+    other: object = None
+
+    def evaluate(self, u):
+        if not self.wide:
+            return super().evaluate(u)
+        gradient = (*self.gradient(u[0], u[1]), 0.0)
+        return Evaluated(np.array([self.f(u[0], u[1]), u[2]]), np.array([gradient, (0.0, 0.0, 1.0)]))
+
+    def weights(self, u, largest):
+        return np.ones(len(u))
+
+    def adapted(self, u, evaluation):
+        return self.other
+
+    def images(self, u):
+        return [u]
+
+    def transfer(self, u, origin):
+        return np.append(u, 0.0) if len(u) < 2 + self.wide else u[: 2 + self.wide]
+
+
+@pytest.mark.parametrize("beside", [-1e-3, -2e-4, 2e-4, 1e-3])
+def test_a_hairpin_is_passed_as_its_discretisation_changes(beside):
+    """At every step the curve moves by more than its steps are long where it turns: it keeps its heading, is passed
+    once, and is left on its other side.
+    """
+    radius = 1e-3
+    narrow, wide = (
+        Hairpin(
+            lambda x, p, at=at: p - at - x**2 / (2 * radius),
+            lambda x, p: (-x / radius, 1.0),
+            wide=at != 0.0,
+            beside=at,
+        )
+        for at in (0.0, beside)
+    )
+    narrow.other, wide.other = wide, narrow
+    begin = start(narrow, math.sqrt(2 * radius), 1.0)
+    engine = March(begin, -1.0, (-1.0, 1.0), NEWTON, SteppingOptions())
+    points = list(engine)
+    assert engine.ending.reason is EndReason.RANGE_END
+    assert points[0].u[0] > 0.0 > points[-1].u[0]
+    x = np.array([point.u[0] for point in points])
+    assert np.all(np.diff(x) < 0.0)
+
+
+def test_a_curve_that_comes_back_along_itself_has_not_arrived(monkeypatch):
+    """Whatever turns it round: what ends where it began, headed back, is not at the end of the range."""
+    advance, steps = March._advance, []
+
+    def turned_once(self, *known):
+        new, *rest = advance(self, *known)
+        steps.append(new)
+        return (new.turned if len(steps) == 10 else new), *rest
+
+    monkeypatch.setattr(March, "_advance", turned_once)
+    engine, points, _ = march(cubic(), 1.4, -1.3, 1.0, (-1.3, 1.3))
+    assert engine.ending.reason is EndReason.RETRACED
+    assert engine.ending.early
+    assert "came back along itself to p = -1.3" in engine.ended
+    # from inside the range it is stopped where it began
+    steps.clear()
+    engine, points, _ = march(cubic(), 1.4, -1.3, 1.0, (-3.0, 1.3))
+    assert engine.ending.reason is EndReason.RETRACED
+    assert points[-1].parameter < -1.2
+
+
+def test_the_other_side_of_a_hairpin_is_not_the_same_place():
+    """Two stretches that run the other way, 2e-5 apart, are two."""
+    half = 1e-5
+    hairpin = Plane(lambda x, p: p - (x / half) ** 2, lambda x, p: (-2 * x / half**2, 1.0))
+    there = start(hairpin, half, 1.0).turned
+    there = there if there.tangent[1] < 0.0 else there.turned
+    back = [start(hairpin, -half * math.sqrt(p), p) for p in (0.98, 1.02)]
+    back = [point if point.tangent[1] > 0.0 else point.turned for point in back]
+    assert not Place(there).retraced(*back, NEWTON)
+    same = [start(hairpin, half * math.sqrt(p), p) for p in (0.98, 1.02)]
+    same = [point if point.tangent[1] > 0.0 else point.turned for point in same]
+    assert Place(there).retraced(*same, NEWTON)
+    assert not Place(there.turned).retraced(*same, NEWTON)

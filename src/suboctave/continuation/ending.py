@@ -23,6 +23,7 @@ class EndReason(StrEnum):
     STEP_TOO_SMALL = "step too small"
     MAX_POINTS = "max points"
     ASTRAY = "astray"  # it goes round and round without passing its start
+    RETRACED = "retraced"  # it came back along itself
     FAILED = "failed"  # something of a point could not be computed
     NO_MEANING = "no meaning"  # what it consists of can no longer be told from other motions
     CUT = "cut"  # a part of a longer curve
@@ -38,6 +39,7 @@ _EARLY = {
     EndReason.STEP_TOO_SMALL,
     EndReason.MAX_POINTS,
     EndReason.ASTRAY,
+    EndReason.RETRACED,
     EndReason.FAILED,
     EndReason.NO_MEANING,
     EndReason.INTERRUPTED,
@@ -58,6 +60,10 @@ _SENTENCES = {
     EndReason.ASTRAY: (
         "came back to {where} without having passed its start: where two branches nearly touch it went over to another "
         "one. Try a smaller max_step"
+    ),
+    EndReason.RETRACED: (
+        "came back along itself to {where}: at a turn sharper than its steps or its harmonics show it lost its "
+        "direction. Try more harmonics, or a smaller max_step"
     ),
     EndReason.FAILED: "what follows {where} could not be computed: {detail}; what was computed is kept",
     EndReason.INTERRUPTED: "interrupted at {where}; what was computed is kept",

@@ -20,7 +20,7 @@ from suboctave.continuation.bounds import Bounds, Range
 from suboctave.continuation.ending import Ending, EndReason
 from suboctave.continuation.linear import cosine, distance, length
 from suboctave.continuation.newton import NewtonOptions, Solved, closely, correct
-from suboctave.continuation.point import CurvePoint, between, make_point
+from suboctave.continuation.point import CurvePoint, between, make_point, solved_again
 from suboctave.continuation.problem import Array, Curve
 from suboctave.errors import ConvergenceError, InputError, check_numbers
 
@@ -33,6 +33,10 @@ _HALVED = 20
 #: ways beyond a corner, as shares of the parameter's range, at which the curve is looked for; up to which of them, and
 #: how many times as far from the corner, it is taken without further question
 _BEYOND, _AT_ONCE, _CLOSE = (1e-6, 1e-5, 1e-4, 1e-3), 1e-5, 100.0
+#: how far beside a place, or short of it, a step may pass it, as a share of its length
+_BESIDE = 0.05
+#: distance in scaled arclength, in one plane, below which two stretches of a curve are one
+_SAME = 1e-6
 #: steps below which points are solved for more closely anyway, and the share of the step that a point may lie off where
 #: rounding leaves more
 _CLOSELY, _LEFT = 1e-4, 1e-2
@@ -99,11 +103,39 @@ class Place:
 
     def passed(self, point: CurvePoint, new: CurvePoint) -> CurvePoint | None:
         """It again, if the step from `point` to `new` passes it in the same direction."""
+        for _, image, fraction in self._beside(point, new, 1.0):
+            miss = length(new.weights * (between(point, new, fraction) - image))
+            if miss < _BESIDE * distance(new.u, point.u, new.weights) + 1e-6:
+                way = distance(image, point.u, new.weights)
+                return replace(self.point, arclength=point.arclength + way)
+        return None
+
+    def retraced(self, point: CurvePoint, new: CurvePoint, newton: NewtonOptions) -> bool:
+        """Whether the step from `point` to `new` comes back to it the other way round, which no curve does: one that
+        folds back right beside itself is told from it by solving for both in one plane.
+        """
+        curve, weights = new.curve, new.weights
+        for i, image, fraction in self._beside(point, new, -1.0):
+            if i > 0:
+                continue  # a sub-harmonic curve may pass its parent and lead back as its own image
+            along = curve.transfer(self.point.tangent, self.point.curve)
+            row = weights * along / length(weights * along)
+            guess = between(point, new, fraction)
+            guess -= float(row @ (weights * (guess - image))) * row / weights
+            with suppress(ConvergenceError):
+                own, other = (correct(curve, u, row, weights, newton) for u in (image, guess))
+                return distance(own.u, other.u, weights) < _SAME
+        return False
+
+    def _beside(self, point: CurvePoint, new: CurvePoint, sense: float) -> Iterator[tuple[int, Array, float]]:
+        """Its images that the step from `point` to `new` passes, headed as it is (+1) or the other way round (-1):
+        which they are, where they lie, and the fraction of the step at which it passes them.
+        """
         w, own = new.weights, self.point
         step = distance(new.u, point.u, w)
         here, reach = new.parameter, 1.5 * step / w[new.curve.parameter]
         if all(abs(here - value) > reach for value in self._values):
-            return None
+            return
         if self._images is None or self._images[0] is not new.curve:
             self._images = (new.curve, new.curve.images(new.curve.transfer(own.u, own.curve)))
         for i, turned in enumerate(self._images[1]):
@@ -114,15 +146,11 @@ class Place:
             # a shift in time turns the vector and, where there are instants among the unknowns, moves it
             start, way = (new.curve.transfer(v, own.curve) for v in (own.u, own.tangent))
             leaving = new.curve.images(start + way)[i] - turned
-            ahead = from_point @ (w * point.tangent) >= 0.0 and to_new @ (w * new.tangent) > 0.0
-            same_way = (w * leaving) @ (w * new.tangent) > 0.5 * length(w * leaving)
-            if not (ahead and same_way):
-                continue
-            fraction = length(from_point) / (length(from_point) + length(to_new))
-            miss = length(w * (between(point, new, fraction) - image))
-            if miss < 0.05 * step + 1e-6:
-                return replace(own, arclength=point.arclength + length(from_point))
-        return None
+            before, beyond = float(from_point @ (w * point.tangent)), float(to_new @ (w * new.tangent))
+            same_way = sense * float((w * leaving) @ (w * new.tangent)) > 0.5 * length(w * leaving)
+            # a curve that is closed begins anew beyond its start; one that has come back may end on it
+            if same_way and before >= 0.0 and beyond > (0.0 if sense > 0.0 else -_BESIDE * step):
+                yield i, image, length(from_point) / (length(from_point) + length(to_new))
 
 
 @dataclass(frozen=True)
@@ -199,23 +227,25 @@ class March:
             if count >= options.max_points:
                 self.ending = Ending(EndReason.MAX_POINTS, point.curve.where(point.u), str(options.max_points))
                 return
-            point = self._rescaled(curve, point, largest)
+            here = self._carried(curve, point, largest)
             try:
-                new, deviation, turn = self._advance(point, step, behind)
+                new, deviation, turn = self._advance(here, step, behind)
             except ConvergenceError as failure:
-                where = point.curve.where(point.u)
+                where = here.curve.where(here.u)
                 self.ending = Ending(EndReason.STEP_TOO_SMALL, where, f"{options.min_step:.0e} at {where}: {failure}")
                 return
-            arrival = None if self.arrive is None else self.arrive(point, new)
+            arrival = None if self.arrive is None else self.arrive(here, new)
             if arrival is not None:
                 self.ending = arrival.ending
                 if arrival.point is not None:
                     yield arrival.point
                 return
-            finer = None if self.finer is None else self.finer(point, new)
+            finer = None if self.finer is None else self.finer(here, new)
             if finer is not None:
+                # from the point as it was solved for, not from what fewer harmonics made of it
                 curve = finer
                 continue
+            point = here
             largest = max(largest, new.curve.size(new.u))
             back = None if count < 3 else home.passed(point, new)
             if back is not None:
@@ -225,6 +255,9 @@ class March:
             if marked and count > marked + 3 and mark.passed(point, new) is not None:
                 self.ending = Ending(EndReason.ASTRAY, new.curve.where(new.u))
                 return
+            if count > 3 and any(place.retraced(point, new, self.newton) for place in {home, mark}):
+                self.ending = Ending(EndReason.RETRACED, new.curve.where(new.u))
+                return
             landed: CurvePoint | None = None
             try:
                 for ends in ranges:  # the one that it leaves first
@@ -233,7 +266,11 @@ class March:
                 self.ending = Ending(EndReason.LEFT_RANGE, point.curve.where(point.u))
                 return
             if landed is not None:
-                self.ending = Ending(EndReason.RANGE_END, landed.curve.where(landed.u))
+                # what comes to where it began need not have gone beyond it
+                back_again = count > 3 and home.retraced(point, landed, self.newton)
+                self.ending = Ending(
+                    EndReason.RETRACED if back_again else EndReason.RANGE_END, landed.curve.where(landed.u)
+                )
                 yield landed
                 return
             yield new
@@ -249,15 +286,21 @@ class March:
             behind = [point, *behind[: _BEHIND - 1]] if deviation > 0.0 else []
             curve, point = new.curve.adapted(new.u, new.evaluation), new
 
-    @staticmethod
-    def _rescaled(curve: Curve, point: CurvePoint, largest: float) -> CurvePoint:
-        """The same point as one of `curve`, with scaling and tangent length of the present amplitude."""
-        p, u, along = point, curve.transfer(point.u, point.curve), curve.transfer(point.tangent, point.curve)
-        weights = curve.weights(u, largest)
-        size = length(weights * along)
-        if not 0.0 < size < math.inf:
-            raise OverflowError(f"the tangent has the length {size:g}")
-        return CurvePoint(curve, u, along / size, weights, p.evaluation, p.orientation, p.arclength, p.iterations)
+    def _carried(self, curve: Curve, point: CurvePoint, largest: float) -> CurvePoint:
+        """The same point as one of `curve`, with scaling and tangent length of the present amplitude.
+
+        In another discretisation it is solved for again: what harmonics move may be more than a step, or than a sharp
+        turn is wide, and a point that does not lie on the curve does not tell which way it leads. Fewer unknowns are
+        taken only where its heading stays what it was.
+        """
+        here = _rescaled(curve, point, largest)
+        if len(here.u) == len(point.u):
+            return here
+        with suppress(ConvergenceError):
+            again = solved_again(here, curve, here.weights, self.newton)
+            if again.orientation == here.orientation and _angle(here, again) < self.stepping.sharpest:
+                return again
+        return here if len(here.u) > len(point.u) else _rescaled(point.curve, point, largest)
 
     def _advance(self, point: CurvePoint, step: float, behind: list[CurvePoint]) -> tuple[CurvePoint, float, float]:
         """One accepted step: new point, distance between prediction and solution, angle between the tangents."""
@@ -286,7 +329,7 @@ class March:
                     fine = turn < options.sharpest and solved.distance < 0.4 * step
                     fine = fine and taken <= 1.000001 * options.max_step
                     # nor across a corner that lies nearer
-                    fine = fine and _leaving(point, new) is new
+                    fine = fine and not _overshot(point, new)
                     fine = fine and (self.inspect is None or self.inspect(point, new))
                 if fine:
                     beyond = _leaving(point, new) if step <= options.min_step else new
@@ -360,6 +403,10 @@ class March:
                 nearer = None
                 continue
             new = _leaving(point, new)
+            if new.orientation != point.orientation:
+                # a stretch that leads to the corner, not from it
+                nearer = None
+                continue
             if share <= _AT_ONCE and taken <= _CLOSE * share:
                 return new, 0.0, _angle(point, new)
             # what lies farther comes from the corner if a tenth of the share leads less than half as far
@@ -381,18 +428,35 @@ class March:
         return min(0.98 * options.max_step, max(step, options.min_step))
 
 
-def _leaving(point: CurvePoint, new: CurvePoint) -> CurvePoint:
-    """The second of two neighbours; behind a corner headed away from it.
+def _rescaled(curve: Curve, point: CurvePoint, largest: float) -> CurvePoint:
+    """A point carried over to `curve` as it is, with scaling and tangent length of the present amplitude."""
+    p, u, along = point, curve.transfer(point.u, point.curve), curve.transfer(point.tangent, point.curve)
+    weights = curve.weights(u, largest)
+    size = length(weights * along)
+    if not 0.0 < size < math.inf:
+        raise OverflowError(f"the tangent has the length {size:g}")
+    return CurvePoint(curve, u, along / size, weights, p.evaluation, p.orientation, p.arclength, p.iterations)
 
-    The corner lies where the tangents meet: `new - point = d a + s b` with unit tangents a and b. Where s is negative
-    the corner lies ahead of the second one as it is headed, and it is turned.
+
+def _overshot(point: CurvePoint, new: CurvePoint) -> bool:
+    """Whether a corner lies ahead of the second of two neighbours as it is headed.
+
+    The corner lies where the tangents meet: `new - point = d a + s b` with unit tangents a and b; s is negative then.
     """
     a, b, way = (new.weights * vector for vector in (point.tangent, new.tangent, new.u - point.u))
     a, b = a / length(a), b / length(b)
     cosine_between = float(a @ b)
     sine_squared = 1.0 - cosine_between**2
-    beyond = float(way @ b) - cosine_between * float(way @ a)
-    return new if sine_squared < _STRAIGHT or beyond >= 0.0 else new.turned
+    return sine_squared >= _STRAIGHT and float(way @ b) < cosine_between * float(way @ a)
+
+
+def _leaving(point: CurvePoint, new: CurvePoint) -> CurvePoint:
+    """The second of two neighbours; behind a corner headed away from it, which is where the orientation stays.
+
+    On the two sides of a corner F_u differs across the surface between them alone: `det [F_u; t]` has the same sign on
+    both as long as both tangents t cross the surface to the same side.
+    """
+    return new.turned if _overshot(point, new) and new.orientation != point.orientation else new
 
 
 def _angle(a: CurvePoint, b: CurvePoint) -> float:

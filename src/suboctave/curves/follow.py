@@ -36,7 +36,7 @@ from suboctave.curves.identity import relation
 from suboctave.curves.junction import UNSEEN, Meeting, meeting
 from suboctave.curves.leaving import multiple_at
 from suboctave.curves.ledgers import REASON, CountCheck, DoublingWatch, HiddenDoublings, pair_in
-from suboctave.curves.motion import CRITICAL, MotionProblem
+from suboctave.curves.motion import CRITICAL, MotionEvaluation, MotionProblem
 from suboctave.curves.refine import bifurcation_at, solved_bifurcation, solved_in, turns_at
 from suboctave.curves.sample import Sample
 from suboctave.curves.trace import Settings, Trace, joined
@@ -217,6 +217,8 @@ class _Follower(Driver):
 
     def _clear(self, a: CurvePoint, b: CurvePoint) -> bool:
         """True if a step stays on its curve and its interior could be looked at, or ends where it meets another."""
+        assert isinstance(a.evaluation, MotionEvaluation)
+        assert isinstance(b.curve, MotionProblem)
         met = meeting(a, b, self.settings.newton)
         self._meeting = None if met is None else (a, b, met)
         if met is not None:
@@ -224,6 +226,9 @@ class _Follower(Driver):
         self._candidate = new = self._sample(b)
         if self.previous is None or self.previous.at_rest or new.at_rest:
             return True
+        if a.evaluation.curve is b.curve is not self.previous.curve:
+            # the step began with solving for its start in its own discretisation
+            self._again = (self.previous, b.curve, self.previous.at(a))
         return not self._guard.refuses(self._solved_again(self.previous, new), new)
 
     def _arrived(self, a: CurvePoint, b: CurvePoint) -> Arrival | None:

@@ -1,9 +1,15 @@
 """The channels of laws that are asked at nodes, along a motion whose stability is looked for.
 
-Elements with nodes of their own have one channel for each of their inputs, behind those of the groups. Panels end just
-before and just behind every corner of a law: between such marks lies a slice of no length to speak of, into which goes
-what the corner adds as it is reached earlier or later. Channels without force make panels follow what a law follows: a
-velocity in which it is sharp, or the function that vanishes at a corner.
+An element with nodes of its own (`aft.general`), of force f(q, theta) along d_out, adds `d_out (f_ui d_i^T y + f_vi
+d_i^T y')` per input: one channel each, with its own direction to the left and to the right, behind those of the groups.
+Panels end just before and just behind every corner of a law: between such marks lies a slice of no length to speak of,
+into which goes what the corner adds as it is reached earlier or later. Channels without force make panels follow what a
+law follows, a velocity in which it is sharp or has corners, hold the marks of surfaces, and give the time at the nodes.
+
+Such laws give their tangents at all nodes at once, along the motion as it stands and, where it is corrected by
+`d(tau)`, again; but for sharp laws `f_u + f_uu d + f_uv d'` is taken at the old nodes. Panels are graded towards the
+old passages, and where d exceeds the law's width the new ones lie between the nodes; the linear form has the right
+integral all the same.
 """
 
 from __future__ import annotations
@@ -190,6 +196,13 @@ class Channels:
                     later, length = -(normal @ d[:, i]) / passing, 2.0 * spans[p, 0]
                     impulses = np.multiply.outer(jumps, -1.5 * later / length * (1.0 - NODES**2))
                     self._put(nodal, begin, scale, impulses, law[:, :, i : i + ORDER])
+
+    def together(self, channel: int) -> slice:
+        """The channels of the element with nodes of its own that one belongs to; of others, it alone."""
+        for nodal, begin, _ in self._laws:
+            if begin >= self.first and begin <= channel < begin + nodal.count:
+                return slice(begin, begin + nodal.count)
+        return slice(channel, channel + 1)
 
     def marked(self, events: Array, owner: np.ndarray) -> Array:
         """Events along a motion, rows as of `time_mesh.events_along`, with the marks just before and just behind every

@@ -13,15 +13,8 @@ to the errors, the more the less multipliers are apart. So does the share of the
 make. Perturbations that decay while no channel acts need not be followed either: the period begins with the longest
 such time.
 
-Here r is the force that the motion leaves unbalanced. All elements along one direction are one channel. An element with
-nodes of its own (`aft.general`), of force f(q, theta) along d_out, adds `d_out (f_ui d_i^T y + f_vi d_i^T y')` per
-input: one channel each, with its own direction to the left and to the right. Channels without force make panels follow
-what such a law follows (a corner in velocity, a sharp law in velocity), and give the time at the nodes.
-
-Laws that their smoothness class is all of are evaluated in compiled code. All other elements give their tangents at all
-nodes at once, along the motion as it stands and, where it is corrected by `d(tau)`, again; but for sharp laws `f_u +
-f_uu d + f_uv d'` is taken at the old nodes. Panels are graded towards the old passages, and where d exceeds the law's
-width the new ones lie between the nodes; the linear form has the right integral all the same.
+Here r is the force that the motion leaves unbalanced. All elements along one direction are one channel. Laws that their
+smoothness class is all of are evaluated in compiled code, all others at all nodes at once (`channels`).
 
 A motion of H harmonics is not quite the true one: it leaves the force `r = sum d (f - P_H f)` unbalanced, P_H f the
 part of the element forces within the basis. One step of Newton's method among periodic functions (Kantorovich),
@@ -32,9 +25,14 @@ whose propagator is at hand, gives what the motion lacks: harmonics beyond H wit
 in those within. The multipliers are those of the motion so corrected, with an error of second order. How far they are
 from those of the motion as it stands, propagated with fewer digits, is their error estimate: it covers what is left
 many times over, and it also covers how far other discretisations of the motion, such as Hill's determinant, may differ.
+It is at least the distance to the nearest of those: multipliers that meet on their way go farther than the first order
+says. A step that moves the motion along a channel by more than a share of it, and the channel's stiffness or damping
+by more than that share, is cut down to it. At a channel at rest rounding is many times the motion, and a step of that
+size does nothing to the law.
 
-At a limit point there is no such step: a motion of the same frequency is far away, or there is none. What the step
-moves along the direction of the multiplier near +1 is then left out, and belongs to the error: with the gap
+At a limit point, which the multipliers of the motion as it stands tell, there is no such step: a motion of the same
+frequency is far away, or there is none. What the step moves along the direction of the multiplier near +1 is then left
+out, and belongs to the error: with the gap
 `g = 1 - mu` and the shift D of the multiplier to first order, the motions near a fold leave `g^2 - 2 g D` for the
 square of the gap, so that the shift is at most about `sqrt(2 g |D|)`.
 
@@ -77,6 +75,7 @@ from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.quadrature import search_grid, singular_instants
 from suboctave.interruption import check_time
+from suboctave.lazy import lazy
 
 #: how far blocks without states may move multipliers, and how much further where a force is left unbalanced altogether,
 #: which does more
@@ -88,6 +87,7 @@ _LENGTHS = (1.2, 1.8, TURNS, 1.0 / 12.0)
 _FORGOTTEN = math.log(1e-14)
 #: how often panels are made shorter, as what is seen between their nodes needs it
 _DIVIDED = 6
+_TINY = float(np.finfo(float).tiny)
 _NO_PASSAGES = np.zeros((2, 0))
 _NO_MULTIPLIERS = np.empty(0, dtype=complex), np.empty(0)
 
@@ -245,6 +245,12 @@ class _Linearised:
         self._own.changed(self.path, change, law, self.spans)
         return law, kick
 
+    @lazy
+    def standing(self) -> ComplexArray:
+        """Multipliers along the motion as it stands, (size,)."""
+        real, imaginary, *_ = lapack.dgeev(self.before, 0, 0)
+        return real + 1j * imaginary
+
     @property
     def rounding(self) -> float:
         """Relative errors of multipliers due to eigenvectors that are nearly parallel."""
@@ -292,10 +298,13 @@ class _Linearised:
                 start = self._still()
             elif weight < 1.0:
                 start = start - (1.0 - weight) * (projector(self.before) @ start)
-            share = response(
+            excess = response(
                 self._structures, self._stretch, self._forms, self.active, self._acting, self._solved, self._states,
                 start, self._whole, self._kept, self.path, _LARGEST, change,
             )  # fmt: skip
+            if excess > 1.0:
+                share = self._share(change)
+                change = share * change if share > 0.0 else np.zeros_like(change)
         law, kick = self._changed(change)
         after = self._march(law, kick, self.size)[self._kept]
         mu, shift = np.empty(self.size, dtype=complex), np.empty((2, self.size))
@@ -303,7 +312,30 @@ class _Linearised:
         multipliers_and_shifts(
             real, imaginary, left, right, after, self.before, self.neglected, self._doubt(change, share), mu, shift
         )
+        # where multipliers meet on their way the first order tells too little: each has at least come from the nearest
+        np.maximum(shift[0], np.abs(mu[:, None] - self.standing).min(axis=1), out=shift[0])
         return mu, shift, share
+
+    def _share(self, change: Array) -> float:
+        """The share of a correction (C, 2, N) with which none moves the motion along a channel by more than `_LARGEST`
+        of it, or its stiffness and damping by as much of theirs, whichever allows more: what is added to a channel at
+        rest may be many times its motion and mean nothing to its law. One that is not finite is left out.
+        """
+        if not np.isfinite(change).all():
+            return 0.0
+        after, kick = self._changed(change)
+        worst = 1.0
+        for g in self.active.tolist():
+            most, motion = (float(np.abs(part[g, 0]).max()) for part in (change, self.path))
+            if most <= _LARGEST * motion:
+                continue
+            own = self._own.together(g)
+            turned = math.inf if kick[own].any() else 0.0
+            for old, new in ((self.law[own, part], after[own, part]) for part in (1, 2)):
+                if (new != old).any():
+                    turned = max(turned, float(np.abs(new - old).max() / max(np.abs(old).max(), _TINY)))
+            worst = max(worst, min(most / max(motion, _TINY), turned) / _LARGEST)
+        return 1.0 / worst
 
     def _doubt(self, change: Array, share: float) -> float:
         """Share of a correction that blocks without states make, as springs, of forces that turn faster than these."""
@@ -314,7 +346,8 @@ class _Linearised:
 
 #: singular value of `1 - monodromy`, as a share of the largest, of a direction that is left as it is
 _SHIFTED = 1e-6
-#: a correction larger than this share of the motion is cut down to it
+#: a correction that moves a channel's motion, and its stiffness or damping, by more than this share of them is cut
+#: down to it
 _LARGEST = 0.1
 #: shift of a multiplier in units of its distance to +1 that leaves doubt whether the first order tells it
 _DOUBTFUL = 0.1
@@ -349,15 +382,13 @@ def _of_equation(state: BalanceState) -> FloquetResult:
 def _with_states(motion: _Linearised) -> tuple[ComplexArray, Array]:
     """Multipliers and errors of the blocks that have states."""
     mu, shift, share = motion.multipliers(1.0)
-    # there are few: numbers are quicker than arrays
-    values, shifts = mu.tolist(), shift[0].tolist()
-    largest = max(1.0, abs(values[0]))
-    # that nearest to +1 before the correction, which may have carried it off
-    nearest = min(range(len(values)), key=lambda i: abs(1.0 - values[i]) - shifts[i])
-    distance = abs(1.0 - values[nearest])
-    moved = shifts[nearest] / share if share > 0.0 else math.inf
-    if motion.state.driven and moved > _DOUBTFUL * distance:
-        mu, shift, share = _beside_fold(motion, moved)
+    largest = max(1.0, abs(mu[0]))
+    # that nearest to +1 is the motion's as it stands: a correction may have carried it off, to meet another one
+    nearest = motion.standing[np.abs(1.0 - motion.standing).argmin()]
+    gap = abs(1.0 - nearest)
+    moved = shift[0, np.abs(mu - nearest).argmin()] / share if share > 0.0 else math.inf
+    if motion.state.driven and moved > _DOUBTFUL * gap:
+        mu, shift, share = _beside_fold(motion, gap, moved)
     # where the correction had to be cut, the motion is not near enough to a true one to say much
     cut = 1.0 / share - 1.0 if share > 0.0 else math.inf
     least = (ACCURACY if motion.coupled else 0.0) + motion.rounding + cut
@@ -374,12 +405,12 @@ def _no_numbers(state: BalanceState, count: int) -> FloquetResult:
     return FloquetResult.inapplicable(count, "monodromy", "The linearised motion is not finite")
 
 
-def _beside_fold(motion: _Linearised, moved: float) -> tuple[ComplexArray, Array, float]:
+def _beside_fold(motion: _Linearised, gap: float, moved: float) -> tuple[ComplexArray, Array, float]:
     """Multipliers, shifts and share where a correction may have no meaning, as it does at a limit point.
 
-    moved: shift of the multiplier nearest to +1 by the whole correction.
+    gap: distance to +1 of the multiplier nearest to it along the motion as it stands; moved: its shift by the whole
+    correction.
     """
-    gap = float(np.abs(1.0 - np.linalg.eigvals(motion.before)).min())
     ratio = 2.0 * moved / gap if gap > 0.0 else math.inf
     mu, shift, share = motion.multipliers(1.0 / (1.0 + min(ratio, 1e6) ** 4))
     left_out = moved * min(1.0, 2.0 / math.sqrt(ratio)) if math.isfinite(moved) else math.inf

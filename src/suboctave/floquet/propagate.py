@@ -226,8 +226,8 @@ def march(structures, stretch, forms, law, loose, kick, active, total, kept, act
 @kernel(fastmath=_FAST, error_model="numpy")
 def response(structures, stretch, forms, active, acting, solved, states, start, whole, kept, path, largest, out):
     """q, q' at the nodes along all channels into `out` (C, 2, N), which is zero, of the response that begins with the
-    kept states `start` (kept, 1); returns the share of it that is left: none is larger than `largest` times the
-    displacement.
+    kept states `start` (kept, 1); returns how much larger it is than `largest` times the motion where that is most,
+    infinity where it is not finite.
 
     structures, stretch, forms, active, acting, solved, states: see `march`; whole (S, kept + 1): states at the end of
     the period, kept (kept,): which of them these are; path (C, 2, N): the motion along all channels.
@@ -279,14 +279,7 @@ def response(structures, stretch, forms, active, acting, solved, states, start, 
             most = max(most, abs(out[channel, 0, at])) if out[channel, 0, at] == out[channel, 0, at] else np.inf
             limit = max(limit, largest * abs(path[channel, 0, at]))
         worst = max(worst, most / limit)
-    share = 1.0 if worst <= 1.0 else 1.0 / worst
-    if share < 1.0:
-        for channel in active:
-            for part in range(2):
-                for at in range(path.shape[2]):
-                    # one that is not finite is left out
-                    out[channel, part, at] = out[channel, part, at] * share if share > 0.0 else 0.0
-    return share
+    return worst
 
 
 @kernel(fastmath=_FAST, error_model="numpy")

@@ -1,6 +1,6 @@
 """The witness: time integration with located contacts, shooting, bifurcations by shooting; knows no harmonic object."""
 
-from suboctave.timedomain.locate import locate_by_shooting, shoot_cycle
+from suboctave.timedomain.locate import locate_by_shooting, shoot_along, shoot_cycle
 from suboctave.timedomain.shooting import PeriodicSolution, shoot
 from suboctave.timedomain.trajectory import Contact, Trajectory, integrate, state_transition
 
@@ -11,6 +11,7 @@ __all__ = [
     "integrate",
     "locate_by_shooting",
     "shoot",
+    "shoot_along",
     "shoot_cycle",
     "state_transition",
 ]

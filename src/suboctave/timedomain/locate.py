@@ -169,13 +169,9 @@ def locate_by_shooting(
     if kind not in _KINDS:
         raise InputError(f"unknown kind of bifurcation {kind!r}{suggest(str(kind), _KINDS)}")
     periods, dof = check_count("periods", periods), observed_dof(system, observe)
-    start = np.array(state, dtype=float)
-    model = scaled_field(system, start, omega, values)
-    # One pass for the size of the motion, then fixed scales: the secant iteration needs one measure of length.
-    _, _, passage = flow(model, 0.0, start / model.scale, 2.0 * np.pi * periods, 1e-6)
-    model.rescale(default_lengths(model, passage.extent * model.scale))
+    model, start = _in_its_size(system, state, omega, values, periods)
     curve = Curve(model, periods, rtol, tol, kind == "BP", budget)
-    point = curve.onto(np.append(start / model.scale, 1.0), None)
+    point = curve.onto(start, None)
     point, test, steps = _drive(curve, point, kind, max_step, max_iterations, reach)
 
     final = model.at_frequency(point.u[-1] * model.reference)
@@ -184,6 +180,41 @@ def locate_by_shooting(
     )
     _confirm(kind, solution, point)
     return solution
+
+
+def shoot_along(
+    system: System,
+    state: ArrayLike,
+    omega: float,
+    periods: int = 1,
+    values: Mapping[str, float] | None = None,
+    tol: float = 1e-11,
+    observe: int | str | None = None,
+    rtol: float = 1e-12,
+) -> PeriodicSolution:
+    """The nearest point, to a state (2n,) and a frequency, of the curve of periodic motions with `omega` free.
+
+    Right beside a limit point there may be no motion of the same omega, or one as far off as the square root of what
+    separates the two frequencies; the curve is as near as anywhere. Raises ConvergenceError where there is none near.
+    """
+    periods, dof = check_count("periods", periods), observed_dof(system, observe)
+    model, start = _in_its_size(system, state, omega, values, periods)
+    point = Curve(model, periods, rtol, tol, branch_point=True).onto(start, None)
+    final = model.at_frequency(point.u[-1] * model.reference)
+    return finish(final, point.u[:-1] * model.scale, periods, point.transition, point.residual, 0, dof, rtol)
+
+
+def _in_its_size(
+    system: System, state: ArrayLike, omega: float, values: Mapping[str, float] | None, periods: int
+) -> tuple[Field, Array]:
+    """The field scaled by the size that a motion has over its period, and state and eta in these scales: one pass, then
+    fixed, since what is measured along a curve needs one unit of length.
+    """
+    start = np.array(state, dtype=float)
+    model = scaled_field(system, start, omega, values)
+    _, _, passage = flow(model, 0.0, start / model.scale, 2.0 * np.pi * periods, 1e-6)
+    model.rescale(default_lengths(model, passage.extent * model.scale))
+    return model, np.append(start / model.scale, 1.0)
 
 
 def shoot_cycle(

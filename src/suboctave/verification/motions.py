@@ -22,8 +22,9 @@ from suboctave.model.elements.smoothness import CornerSampling
 from suboctave.model.projected import ProjectedSystem
 from suboctave.model.system import System
 from suboctave.projection import system_of_motions
-from suboctave.timedomain import PeriodicSolution, integrate, locate_by_shooting, shoot, shoot_cycle
+from suboctave.timedomain import PeriodicSolution, integrate, locate_by_shooting, shoot, shoot_along, shoot_cycle
 from suboctave.verification.harmonics import left_out, up_to_harmonics
+from suboctave.verification.result import AGREES, DISAGREES, OPEN
 
 #: the kinds that shooting locates by themselves, along the curve of motions
 LOCATED = ("LP", "BP", "PD", "NS")
@@ -46,9 +47,10 @@ class Verification:
         Largest difference between multipliers, paired.
     stable
         The verdict of shooting on the motion's stability, None if no motion was found.
-    agrees
-        Whether shooting arrives at the same motion with the same verdict; at a bifurcation, where no verdict exists,
-        whether it locates one of the same kind at the same place.
+    outcome
+        "agrees" where shooting arrives at the same motion with the same verdict; at a bifurcation, where no verdict
+        exists, where it locates one of the same kind at the same place. Else "disagrees", or "cannot tell"; `reason`
+        says why.
     solution
         The motion found by shooting, None if it found none (`reason` says why). Of a large structure its state is
         that of all degrees of freedom, multipliers and monodromy matrix are those of the projection.
@@ -60,13 +62,18 @@ class Verification:
     distance: float
     multiplier_error: float
     stable: bool | None
-    agrees: bool
+    outcome: str
     solution: PeriodicSolution | None
     reason: str
     projection: ProjectedSystem | None = None
 
+    @property
+    def agrees(self) -> bool:
+        """Whether it does, for certain."""
+        return self.outcome == AGREES
+
     def __repr__(self) -> str:
-        verdict = "agrees" if self.agrees else "DISAGREES"
+        verdict = self.outcome.upper() if self.outcome == DISAGREES else self.outcome
         errors = f"distance {self.distance:.1e}, multipliers {self.multiplier_error:.1e}"
         basis = "" if self.projection is None else f"\n  {self.projection.words}"
         return f"Verification: {verdict}; {errors}. {self.reason}{basis}"
@@ -94,31 +101,37 @@ def verify_motion(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: fl
             folds = isinstance(what, Bifurcation) and what.kind in ("LP", "BP")
             solution = shoot_cycle(system, start, motion.omega, periods=motion.basis.nu, corrected=not folds)
         elif kind is None:
-            solution = shoot(system, start, motion.omega, periods=motion.basis.nu)
+            # where a multiplier may be +1, as at a limit point, a true motion of the same omega is as far away as the
+            # square root of what separates two curves, or there is none: the nearest one of the curve is taken
+            apart, errors = np.abs(1.0 - floquet.multipliers), floquet.errors
+            beside_fold = not touches and bool((apart <= np.maximum(errors, tolerance)).any())
+            nearest = shoot_along if beside_fold else shoot
+            solution = nearest(system, start, motion.omega, periods=motion.basis.nu)
         else:
             solution = _by_shooting(system, motion, kind, start, tolerance)
     except ConvergenceError as failure:
         what_failed = "shooting found no motion from here" if kind is None else "shooting did not locate it"
-        return Verification(math.inf, math.inf, None, False, None, f"{what_failed}: {failure}", projection)
+        return Verification(math.inf, math.inf, None, DISAGREES, None, f"{what_failed}: {failure}", projection)
     distance = max(distance_of(system, motion, start, solution), solution.residual)
     if isinstance(what, Bifurcation) and touches:
         distance = max(distance, distance_from_gap(system, what, solution.state, solution.omega))
-    error = pairing(floquet.multipliers, solution.multipliers)
+    error, off = (pairing(floquet.multipliers, solution.multipliers, relative) for relative in (False, True))
 
-    def verdict(agrees: bool, reason: str) -> Verification:
-        return Verification(
-            distance, error, solution.stable, agrees, recovered_solution(system, solution), reason, projection
-        )
+    def verdict(agrees: bool, reason: str, otherwise: str = DISAGREES) -> Verification:
+        outcome, found = AGREES if agrees else otherwise, recovered_solution(system, solution)
+        return Verification(distance, error, solution.stable, outcome, found, reason, projection)
 
     if kind is not None:
         words = f"Shooting finds {KINDS[kind].words} at omega = {solution.omega:.9g}"
         if solution.kind is None:
             words = f"Shooting sees multipliers cross as at {KINDS[kind].words} close to omega = {solution.omega:.9g}"
         same = distance <= tolerance
+        if same and off > tolerance + floquet.error + 100.0 * distance:
+            words += f"; its multipliers are others (off by {off:.1e}, which their errors do not cover)"
         return verdict(same, words if same else f"{words}: another one (relative distance {distance:.1e})")
     if not distance <= tolerance:
         if not touches and distance <= left_out(motion):
-            return verdict(False, up_to_harmonics(motion, distance))
+            return verdict(False, up_to_harmonics(motion, distance), OPEN)
         other = "a motion that does not graze" if touches else "another motion"
         return verdict(False, f"Shooting arrives at {other} (relative distance {distance:.1e})")
     if alone and isinstance(what, Bifurcation) and what.kind in LOCATED:
@@ -126,12 +139,17 @@ def verify_motion(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: fl
     # at an extremum or a point of codimension two, and of what nothing drives, a multiplier is critical: no verdict to
     # compare
     if not alone and floquet.stable != solution.stable and not isinstance(what, TrackedEvent):
-        doubt = "" if floquet.decided else ": a multiplier lies within its error of the unit circle"
+        margin = abs(float(np.abs(solution.multipliers).max()) - 1.0)
+        if margin <= max(tolerance, floquet.error):
+            near = f"the largest multiplier lies {margin:.1e} from the unit circle"
+            return verdict(False, f"The same motion; {near}, too near to compare verdicts", OPEN)
         other = "stable" if solution.stable else "unstable"
-        return verdict(False, f"Shooting calls it {other}, harmonic balance the opposite{doubt}")
-    return verdict(
-        True, "The same motion" if alone or isinstance(what, TrackedEvent) else "The same motion, the same verdict"
-    )
+        return verdict(False, f"Shooting calls it {other}, harmonic balance the opposite")
+    if alone or isinstance(what, TrackedEvent):
+        return verdict(True, "The same motion")
+    if off > tolerance + 10.0 * floquet.error + 100.0 * distance:
+        return verdict(False, f"Shooting finds other multipliers (off by {off:.1e}) with the same verdict")
+    return verdict(True, "The same motion, the same verdict")
 
 
 def _as_critical(what: Bifurcation, solution: PeriodicSolution, tolerance: float) -> tuple[bool, str]:

@@ -260,10 +260,11 @@ def verify(
     Parameters
     ----------
     what
-        A motion; a `Bifurcation` is located again by shooting, with free omega; at a grazing the motion found at the
-        same omega must just reach the gap. Of a `Branch` every point and every bifurcation is held against the curve of
-        true motions, found by multiple shooting; the answer is a `BranchVerification`. Limit cycles are corrected with
-        their parameter, motions of nonlinear modes with the artificial damping that keeps them going.
+        A motion, at its omega, or with free omega where a multiplier may be +1; a `Bifurcation` is located again by
+        shooting, with free omega; at a grazing the motion found at the same omega must just reach the gap. Of a
+        `Branch` every point and every bifurcation is held against the curve of true motions, found by multiple
+        shooting; the answer is a `BranchVerification`. Limit cycles are corrected with their parameter, motions of
+        nonlinear modes with the artificial damping that keeps them going.
     tolerance
         Relative distance up to which two motions, and two frequencies, count as the same. Verdicts that differ where
         the true multiplier lies so near to the unit circle are not compared.
