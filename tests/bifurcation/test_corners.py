@@ -27,6 +27,26 @@ def test_a_rotor_that_meets_its_stator_jumps_where_the_orbit_reaches_the_clearan
     assert not any("could not be located" in note for note in curve.warnings)
 
 
+@pytest.mark.parametrize("omega", [(6.0, 0.4), (0.4, 6.0)])
+def test_a_rotor_that_whirls_into_its_stator_and_out_of_it(omega):
+    """The whole curve: contact begins everywhere at once, the curve turns there at the upper of the two frequencies."""
+    touch = np.sqrt(np.sort(np.roots([1.0 - (0.05 / 0.2) ** 2, 0.1**2 - 2.0, 1.0])))
+    curve = so.frequency_response(so.library.jeffcott_rotor(), omega, 5)
+    assert curve.ended.startswith("reached the end")
+    assert abs(curve.omega[-1] - omega[1]) < 1e-12
+    low, high = sorted(curve.bifurcations["grazing"], key=lambda event: event.omega)
+    np.testing.assert_allclose([low.omega, high.omega], touch, rtol=1e-9)
+    change = "begins to touch" if omega[1] > omega[0] else "ceases to touch"
+    assert low.contact.change == change
+    corner, fold = sorted(curve.bifurcations["LP"], key=lambda event: event.omega)
+    assert abs(corner.omega - high.omega) <= corner.uncertainty < 1e-7
+    assert fold.omega == pytest.approx(4.38510279, abs=1e-8)
+    # as multipliers outside of the ring are those of the shaft alone
+    exponents = np.roots([1.0, 0.1, 1.0])
+    alone = np.exp(2.0 * np.pi * exponents / low.omega)
+    np.testing.assert_allclose(np.sort(low.multipliers.imag), np.sort([*alone.imag, *alone.imag]), atol=1e-6)
+
+
 def test_a_sharp_fold_of_a_smooth_law_is_no_corner():
     """As sharp as arctan steps of the stiffness make it: solved, not bracketed."""
     stop = so.ElasticStop(0, 200.0, 5.0, regularization=1e4)

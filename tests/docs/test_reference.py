@@ -61,7 +61,7 @@ def test_the_citation_is_of_this_version():
 
 
 #: modules and files that go by the names of results
-OTHERS = {"nc", "png", "gif", "bordered", "measures", "extremum"}
+OTHERS = {"nc", "png", "gif", "bordered", "gaps", "measures", "extremum"}
 
 
 @pytest.fixture(scope="module")

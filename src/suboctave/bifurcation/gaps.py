@@ -16,7 +16,7 @@ import numpy as np
 
 from suboctave.harmonic.aft.channel import Channel
 from suboctave.harmonic.aft.closed_form import corner_weights
-from suboctave.harmonic.aft.corners import Corner, gaps_of, jump, rates_of_state, surface_at
+from suboctave.harmonic.aft.corners import FLAT, Corner, gaps_of, jump, rates_of_state, surface_at
 from suboctave.harmonic.aft.general import GeneralLaw
 from suboctave.harmonic.aft.law import LocalMotion
 from suboctave.harmonic.basis import Array
@@ -115,7 +115,7 @@ class Height(NamedTuple):
     """How far a relative displacement lies above its gap at an instant, and how fast it and its rate by tau move.
 
     height, slope, curve
-        u - gap, and its first two derivatives by tau.
+        u - gap, and its first two derivatives by tau; of a height that stays as it is along the motion its mean, and 0.
     by_x, slope_by_x
         Derivatives of the first two by the coefficients, (2 H + 1, size).
     by_names, slope_by_names
@@ -133,9 +133,13 @@ class Height(NamedTuple):
 
 def height_at(state: BalanceState, element: int, index: int, tau: float, names: Sequence[str] = ()) -> Height:
     """The height of an element over one of its gaps at an instant."""
-    rows = basis_rows(state.basis.harmonics, tau)
     if (surface := _surface_of(state, element, index)) is not None:
-        return _over_surface(state, element, *surface, tau, rows, names)
+        if surface[2].turns[2, 0] != -FLAT:
+            return _over_surface(state, element, *surface, tau, names)
+        every = [_over_surface(state, element, *surface, at, names) for at in search_grid(state.basis.harmonics).tau]
+        height, _, _, by_x, _, by_names, _ = (sum(part) / len(every) for part in zip(*every, strict=True))
+        return Height(float(height), 0.0, 0.0, by_x, np.zeros_like(by_x), by_names, np.zeros(len(names)))
+    rows = basis_rows(state.basis.harmonics, tau)
     direction = read_direction(state, element)
     u = state.x @ direction
     height, slope, curve = (float(row @ u) for row in rows)
@@ -157,8 +161,9 @@ def _surface_of(state: BalanceState, element: int, index: int) -> tuple[Channel,
 
 def _over_surface(
     state: BalanceState, element: int, channel: Channel, law: GeneralLaw, corner: Corner, tau: float,
-    rows: tuple[Array, Array, Array], names: Sequence[str],
+    names: Sequence[str],
 ) -> Height:  # fmt: skip
+    rows = basis_rows(state.basis.harmonics, tau)
     zr, zi = np.cos([tau]), np.sin([tau])
     q, theta = law.state_at(zr, zi)
     here, rates, nu = surface_at(law, corner, q, theta), rates_of_state(law, zr, zi)[:, 0], law.along.nu

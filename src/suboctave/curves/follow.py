@@ -19,6 +19,7 @@ from suboctave.continuation.events import Bracket
 from suboctave.continuation.march import Arrival
 from suboctave.continuation.newton import NewtonOptions
 from suboctave.continuation.point import point_ahead, point_between, solved_again
+from suboctave.curves.corners import beyond_corner
 from suboctave.curves.events.grazings import locate_grazings
 from suboctave.curves.events.layer import behind_their_grazings
 from suboctave.curves.events.monitors import (
@@ -159,7 +160,13 @@ class _Follower(Driver):
     def __init__(self, start: CurvePoint, direction: float, bounds: tuple[float, float], settings: Settings) -> None:
         super().__init__(settings)
         hooks = self._clear, self._arrived, self._finer
-        self.march = March(start, direction, bounds, settings.newton, settings.stepping, *hooks)
+        options = bounds, settings.newton, settings.stepping, *hooks
+        self.march = March(start, direction, *options)
+        #: goes on from a point behind a corner
+        headed = start.turned if start.tangent[start.curve.parameter] * direction < 0.0 else start
+        self._from = lambda point: March(point, 0.0, *options, home=headed)
+        #: where the corners that were passed lie
+        self._corners: list[float] = []
         self._candidate: Sample | None = None
         self._guard = StepGuard(self._between, self._crossing)
         #: the step that is searched
@@ -187,13 +194,32 @@ class _Follower(Driver):
     def _walk(self) -> None:
         # in a fresh installation the first verdict on stability waits for its kernels to be compiled
         self._report(self.march.start)
-        for point in self.march:
-            self._accept(point)
-            if self._turned is not None and self.settings.half:
+        while True:
+            for point in self.march:
+                self._accept(point)
+                if self._turned is not None and self.settings.half:
+                    break
+            beyond = self._beyond_corner()
+            if beyond is None:
                 break
+            self.march = self._from(beyond)
         self.trace.closed = self.march.closed
         self.trace.ends(self.march.ending)
         self.trace.arrives = self._arrival()
+
+    def _beyond_corner(self) -> CurvePoint | None:
+        """A point behind a corner that the steps could not get around as their parameter does not lead on: where a
+        contact begins everywhere at once. None if there is none.
+        """
+        last = self.previous
+        if self.march.ending.reason is not EndReason.STEP_TOO_SMALL or last is None or last.place in self._corners:
+            return None
+        self._corners.append(last.place)
+        corner = beyond_corner(last, (p.orbit for p in reversed(self.trace.points)), self.settings.newton)
+        if corner is None or corner[0] is None:
+            return None
+        self._guard.forget()
+        return corner[0]
 
     def _interrupted(self) -> None:
         trace = self.trace
@@ -491,7 +517,9 @@ class _Follower(Driver):
         if known is None or known[0] is not kind or known[1] is not a or known[2] is not b:
             must_solve = kind is BRANCH_POINT or kind.multiplicity > 1
             begins = a.point.arclength == 0.0 and len(self.trace.points) <= 1
-            located = locate(kind, a, b, self.settings.newton, 9 if must_solve else 34, begins)
+            # across a corner that was passed tangents do not tell which way is ahead
+            bisections = 0 if a.place in self._corners else 9 if must_solve else 34
+            located = locate(kind, a, b, self.settings.newton, bisections, begins)
             unsolved = must_solve and located is not None and located.solution is None
             self._last_located = known = (kind, a, b, None if unsolved else located)
         return known[3]

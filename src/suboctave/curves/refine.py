@@ -21,7 +21,7 @@ from suboctave.curves.events.layer import (
 )
 from suboctave.curves.events.locate import Guess, Singular
 from suboctave.curves.events.monitors import BRANCH_POINT, BifurcationKind, Located, locate, position
-from suboctave.curves.interior import FINEST
+from suboctave.curves.interior import FINEST, contacts_between
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.sample import Sample
 from suboctave.errors import ConvergenceError
@@ -65,11 +65,14 @@ def bifurcation_at(located: Located, a: Sample, b: Sample, observe: int, warning
         why = "a law is rough there" if beside is None else f"{beside.label} grazes there"
         # the bracket of a grazing shows the excursion itself
         if located.bracket is not None:
-            corner = None if beside is not None else _corner(located.kind, *located.bracket)
-            # across a branch point other tests change, too
-            if (beside is None and corner is None) or BRANCH_POINT.changed(*located.bracket):
+            corner = _corner(located.kind, *located.bracket)
+            if beside is None and corner is None:
                 return None
-            if corner is not None:
+            # across a branch point other tests change, too, but also where contact begins everywhere at once
+            crossed = BRANCH_POINT.changed(*located.bracket)
+            if crossed and (corner is None or contacts_between(*located.bracket).grazes is None):
+                return None
+            if corner is not None and (crossed or beside is None):
                 (sample, width), why = corner, "the curve turns abruptly there, in a corner of the equations"
         # what is bracketed is the change of a test; where a contact grazes, harmonics matter beyond that
         width = width if beside is None else max(width, abs(guess.parameter - beside.parameter))

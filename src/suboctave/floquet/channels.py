@@ -22,7 +22,7 @@ import numpy as np
 from suboctave.floquet.time_mesh import NODES, ORDER
 from suboctave.harmonic.aft.channel import Channel
 from suboctave.harmonic.aft.closed_form import NO_ROWS
-from suboctave.harmonic.aft.corners import Corner, surface_at
+from suboctave.harmonic.aft.corners import FLAT, Corner, surface_at
 from suboctave.harmonic.aft.general import GeneralLaw
 from suboctave.harmonic.aft.table import Probe
 from suboctave.harmonic.basis import Array, ComplexArray
@@ -147,11 +147,17 @@ class Channels:
 
     def _state(self, nodal: GeneralLaw, begin: int, path: Array) -> tuple[Array, Array]:
         """q (Q, N) and theta (N,) of an element at the nodes of the panels."""
-        q = _inputs(nodal, begin, path)
-        if self._clock < 0 or not nodal.harmonic:
-            return np.ascontiguousarray(q), np.zeros(q.shape[1])
-        cosine, slope = path[self._clock]
-        return np.ascontiguousarray(q), nodal.along.nu * np.arctan2(-slope / nodal.along.rate, cosine)
+        q, theta = np.ascontiguousarray(_inputs(nodal, begin, path)), np.zeros(path.shape[2])
+        if self._clock >= 0 and nodal.harmonic:
+            cosine, slope = path[self._clock]
+            theta = nodal.along.nu * np.arctan2(-slope / nodal.along.rate, cosine)
+        for corner in nodal.corners:
+            # what reaches a corner everywhere at once would have its sides by rounding
+            if corner.turns[2, :1].sum() == -FLAT and abs(corner.turns[1, 0]) < _SLICE * np.abs(q).max():
+                surface = surface_at(nodal, corner, q, theta)
+                below = surface.value + _SLICE * np.abs(q).max()
+                q = q - below / (surface.normal**2).sum(axis=0) * surface.normal
+        return q, theta
 
     def evaluate(self, path: Array, law: Array) -> None:
         """Add force, stiffness and damping along the path (G, 2, N) to `law` (G, >= 3, N)."""

@@ -39,6 +39,7 @@ from suboctave.curves.events.monitors import BifurcationKind, Located, solved_be
 from suboctave.curves.kinds.grazing import GrazingContactEquations
 from suboctave.curves.sample import Sample
 from suboctave.errors import ConvergenceError
+from suboctave.harmonic.aft.corners import FLAT
 from suboctave.harmonic.basis import Array
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.perturbation import Kind
@@ -152,6 +153,9 @@ def touches(a: Sample, b: Sample) -> tuple[list[Touch], bool]:
             above, maximum = bool(q.value[j] > q.level), bool(q.curve[j] < 0.0)
             # a maximum above the gap and a minimum below it have two crossings beside them
             explained += 2 if above == maximum else -2
+            if p.curve[i] == q.curve[j] == FLAT:
+                # what begins to touch everywhere at once does not lift off besides
+                continue
             first, second = p.value[i] - p.level, q.value[j] - q.level
             share = float(first / (first - second)) if first != second else 0.5
             way = (q.tau[j] - p.tau[i] + math.pi) % (2.0 * math.pi) - math.pi

@@ -82,8 +82,10 @@ class GrazingEquations(Equations):
     @property
     def rows(self) -> Array:
         h = self.height
+        # where contact begins everywhere at once tau stays as it is
+        curve = h.curve or self.of.unit
         above = np.concatenate((h.by_x.ravel(), [h.slope], h.by_names))
-        level = np.concatenate((h.slope_by_x.ravel(), [h.curve], h.slope_by_names))
+        level = np.concatenate((h.slope_by_x.ravel(), [curve], h.slope_by_names))
         return np.array([above, level]) / self.of.unit
 
     def renewed(self) -> GrazingContactEquations:

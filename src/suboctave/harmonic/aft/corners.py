@@ -39,8 +39,9 @@ _NEAR = 1e-6
 #: step in tau by which the second derivative of a surface's function is told; secants towards its zeros and extrema,
 #: and how far the last may move these
 _STEP, _SECANTS, _CLOSE, _ABOUT = 1e-5, 40, 1e-12, 1e-8
-#: change of a surface's function along a motion, relative to its terms, that is rounding
-_ROUNDING = 1e-13
+#: change of a surface's function along a motion, relative to its terms, that is rounding, and the curvature of what
+#: does not turn at all
+_ROUNDING, FLAT = 1e-13, float(np.finfo(float).tiny)
 
 
 class Corner(NamedTuple):
@@ -144,9 +145,9 @@ def _at_surface(law: Cornered, which: int, number: int) -> Corner:
     q, theta = law.state_at(np.cos(tau), np.sin(tau))
     terms = float(np.abs(q * law.surface_slopes(which, q, theta)[1]).sum(axis=0).max())
     if np.ptp(heights) <= _ROUNDING * max(size, terms):
-        # it stays as it is along the motion, as the radius of a circle does
-        none = np.zeros(0)
-        return Corner(number, law.along.size + which, 0.0, size, none, none, none, np.zeros((3, 0)))
+        # it stays as it is along the motion, as the radius of a circle does: a maximum and a minimum of no curvature
+        none, flat = np.zeros(0), np.array([[0.0, math.pi], 2 * [float(heights.mean())], [-FLAT, FLAT]])
+        return Corner(number, law.along.size + which, 0.0, size, none, none, none, flat)
     here = np.flatnonzero((slopes > 0.0) != (np.roll(slopes, -1) > 0.0))
     turns = _zeros(rate, tau[here], tau[here] + tau[1] - tau[0], _ABOUT)
     heights = value(turns)

@@ -1,4 +1,5 @@
-"""Corners of tracked curves: with stops of the exact law a curve turns abruptly where another contact grazes.
+"""Corners of curves: with stops of the exact law one of bifurcations turns abruptly where another contact grazes, and a
+response where contact begins everywhere at once.
 
 Behind a grazing the Jacobian, and with it the test function of a bifurcation, moves like the square root of the
 penetration; before it, smoothly. A curve of bifurcations that crosses a curve of grazings has a corner there, and may
