@@ -38,6 +38,8 @@ _MOVED = 0.05
 #: component of the unit tangent along the parameter, in scaled arclength, at both ends of the shortest interval, from
 #: which on a curve that turns in between does so in a corner: a smooth limit point would be bent by 1e3
 _ABRUPT = 1e-2
+#: how much farther off a corner may be than the tangents beside it say
+_MORE = 1.2
 #: slope of a branch in its parameter at a branch point, both scaled, below which it turns back there
 _STILL = 1e-5
 
@@ -105,15 +107,19 @@ def _corner(kind: BifurcationKind, a: Sample, b: Sample) -> tuple[Sample, float]
     one nearer to it in the parameter, and how far it may lie from that. None if the slope comes to zero on the way, as
     at a smooth one, or the two lie on different curves.
 
-    Up to the corner the curve goes on as at its ends, so that it lies no farther from either than the slope there times
-    the way to the other.
+    Up to the corner the curve goes on about as at its ends, whose tangents meet in it: it lies no farther from either
+    than the slope there times the way to that place, and some more.
     """
-    way = length(b.point.weights * (b.point.u - b.curve.transfer(a.point.u, a.curve)))
+    weights, target = b.point.weights, b.curve.transfer(a.point.u, a.curve)
+    chord = weights * (b.point.u - target)
     steepness = [abs(float(s.point.weights[s.point.curve.parameter])) * abs(s.slope) for s in (a, b)]
-    if kind.name != "LP" or way > FINEST or min(steepness) < _ABRUPT:
+    if kind.name != "LP" or length(chord) > FINEST or min(steepness) < _ABRUPT:
         return None
-    nearer = min((a, b), key=lambda sample: abs(sample.slope))
-    return nearer, abs(nearer.slope) * max(way, b.place - a.place)
+    tangents = np.stack((weights * b.curve.transfer(a.point.tangent, a.curve), weights * b.point.tangent), axis=1)
+    ways = np.maximum(np.abs(np.linalg.lstsq(tangents, chord, rcond=None)[0]), length(chord))
+    widths = [_MORE * abs(s.slope) * float(way) for s, way in zip((a, b), ways, strict=True)]
+    nearer = int(np.argmin(widths))
+    return (a, b)[nearer], widths[nearer]
 
 
 def solved_bifurcation(
