@@ -83,3 +83,16 @@ def test_a_limit_point_at_which_a_branch_begins_is_none_of_these():
     again = so.continue_branch(fold.orbit, "omega", (0.7, 6.0))
     np.testing.assert_allclose([b.omega for b in again.bifurcations["LP"]], [b.omega for b in curve.bifurcations["LP"]])
     assert not any(point.still for point in again.points)
+
+
+def test_motions_that_grow_for_ever():
+    """Far beyond a stop a parametrically excited mass is bilinear: motions of every size, at the frequency at which the
+    bilinear law about zero has a multiplier of one.
+    """
+    system = so.System.from_equations("x'' + 0.02*x' + (1+0.3*cos(omega*t))*x + 3*max(x-0.5,0) = 0", {})
+    doubling = so.frequency_response(system, (2.3, 2.0)).bifurcations["PD"][0]
+    branch = so.switch_branch(doubling, bounds=(1.7, 3.2), harmonics=15)
+    assert "grow without bound" in branch.ended
+    assert len(branch) < 1000
+    assert not branch.bifurcations["LP"]
+    assert branch.omega[-1] == pytest.approx(2.76284217, abs=1e-7)

@@ -22,7 +22,8 @@ from suboctave.continuation import CurvePoint, NewtonOptions, SteppingOptions
 from suboctave.continuation.linear import length
 from suboctave.continuation.problem import Array
 from suboctave.curves.events.locate import Singular
-from suboctave.curves.follow import both_ways, follow, same_event
+from suboctave.curves.follow import both_ways, follow
+from suboctave.curves.identity import same_event
 from suboctave.curves.junction import UNSEEN, Beside, beside, curvature_of, emanating, period_name
 from suboctave.curves.leaving import branch_beside, first_beside
 from suboctave.curves.motion import MotionProblem

@@ -33,7 +33,7 @@ from suboctave.curves.events.monitors import (
     solved_by,
 )
 from suboctave.curves.guard import Crossing, GuardedStep, StepGuard
-from suboctave.curves.identity import relation
+from suboctave.curves.identity import drop_seam, same_event
 from suboctave.curves.junction import UNSEEN, Meeting, meeting
 from suboctave.curves.leaving import multiple_at
 from suboctave.curves.ledgers import REASON, CountCheck, DoublingWatch, HiddenDoublings, pair_in
@@ -45,12 +45,9 @@ from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.truncation import next_harmonics
 from suboctave.interruption import Interruption
 
-#: amplitude, unit of length, up to which a motion is rest here: that of located branch points of rest is rounding
-_NOTHING = 1e-12
-#: cosine of two null vectors beyond which they are one
-_PARALLEL = 0.99
-#: distance of the multipliers of two Neimark-Sacker points of one motion beyond which they are two
-_OTHER_PAIR = 1e-3
+#: growth of motions of every size at one value of the parameter after which they may grow for ever: of a piece that a
+#: branch begins with, and of others
+_GROWN = 1e12, 1e4
 #: speed of the free parameter along a curve, in scaled arclength, at which it turns; how far from there a curve begins
 #: that is followed both ways
 _TURNS, _BESIDE = 1e-2, 3e-3
@@ -96,8 +93,8 @@ class Driver(ABC):
             trace.ends(Ending(EndReason.FAILED, self.previous.where, str(failure)))
         self._finish()
         if trace.closed:
-            _drop_seam(trace.bifurcations)
-            _drop_seam(trace.events)
+            drop_seam(trace.bifurcations)
+            drop_seam(trace.events)
         return trace
 
     def _report(self, point: CurvePoint) -> None:
@@ -108,36 +105,6 @@ class Driver(ABC):
         basis, located = curve.balance.basis, sum(b.kind not in CONTACT_KINDS for b in trace.bifurcations)
         numbers = len(trace.points), located, basis.harmonics // basis.nu
         self.settings.report.at(point.parameter, curve.where(point.u), *numbers)
-
-
-def same_event(a: Bifurcation, b: Bifurcation) -> bool:
-    """Whether two located bifurcations are one, met twice."""
-    if (a.kind, a.parameter_name) != (b.kind, b.parameter_name):
-        return False
-    if a.kind == "grazing" and len({item.contact and item.contact.element for item in (a, b)}) > 1:
-        return False
-    if a.kind == "NS" and abs(a.critical_multiplier() - b.critical_multiplier()) > _OTHER_PAIR:
-        return False
-    if a.multiplicity > 1 and a.multiplicity == b.multiplicity and not _along_one(a, b):
-        return False
-    same_place = all(np.isclose(a.parameter(name), b.parameter(name), rtol=1e-9) for name in a.free_names)
-    if not (same_place and np.isclose(a.amplitude, b.amplitude, rtol=1e-6)):
-        return False
-    # the mirror image of a motion has its amplitude; at rest there is nothing to compare
-    return max(a.amplitude, b.amplitude) <= _NOTHING or relation(a.orbit, b.orbit).one
-
-
-def _along_one(a: Bifurcation, b: Bifurcation) -> bool:
-    """Whether two bifurcations that fall together with others have one null vector."""
-    count = min(len(item.null_vectors.right) for item in (a, b))
-    return bool(abs(np.vdot(a.null_vectors.right[:count], b.null_vectors.right[:count])) > _PARALLEL)
-
-
-def _drop_seam(items: list[Bifurcation]) -> None:
-    """What lies on the seam of a closed curve is met at both ends: keep the first."""
-    # several contacts may graze at once
-    while len(items) > 1 and any(same_event(items[-1], first) for first in items[: min(3, len(items) - 1)]):
-        items.pop()
 
 
 _NOT_FOUND = {
@@ -165,6 +132,8 @@ class _Follower(Driver):
         #: goes on from a point behind a corner
         headed = start.turned if start.tangent[start.curve.parameter] * direction < 0.0 else start
         self._from = lambda point: March(point, 0.0, *options, home=headed)
+        #: size of the last motion at which the parameter moved, or of the first, and how much larger motions may become
+        self._size: tuple[float, float] | None = None
         #: where the corners that were passed lie
         self._corners: list[float] = []
         self._candidate: Sample | None = None
@@ -194,18 +163,34 @@ class _Follower(Driver):
     def _walk(self) -> None:
         # in a fresh installation the first verdict on stability waits for its kernels to be compiled
         self._report(self.march.start)
+        ending: Ending | None = None
         while True:
             for point in self.march:
                 self._accept(point)
-                if self._turned is not None and self.settings.half:
+                ending = self._growing()
+                if ending is not None or (self._turned is not None and self.settings.half):
                     break
             beyond = self._beyond_corner()
             if beyond is None:
                 break
             self.march = self._from(beyond)
         self.trace.closed = self.march.closed
-        self.trace.ends(self.march.ending)
+        self.trace.ends(ending or self.march.ending)
         self.trace.arrives = self._arrival()
+
+    def _growing(self) -> Ending | None:
+        """How the curve ends where motions of every size exist at one value of the parameter, and they have grown by
+        orders of magnitude since it last moved, or by more if it never has: a branch may begin with such a piece.
+        """
+        last = self.previous
+        assert last is not None
+        size = last.curve.size(last.point.u)
+        if self._size is None or not last.still:
+            self._size = size, _GROWN[0] if last.still else _GROWN[1]
+        if size <= self._size[0] * self._size[1]:
+            return None
+        detail = f"the motions grow without bound at {last.where}, where the parameters stand still"
+        return Ending(EndReason.NO_MEANING, last.where, detail)
 
     def _beyond_corner(self) -> CurvePoint | None:
         """A point behind a corner that the steps could not get around as their parameter does not lead on: where a

@@ -27,6 +27,7 @@ from enum import Enum
 
 import numpy as np
 
+from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.continuation.problem import Array
 from suboctave.curves.trace import BranchPoint
 from suboctave.harmonic.basis import ComplexArray, to_complex, to_real
@@ -37,6 +38,12 @@ from suboctave.harmonic.orbit import PeriodicOrbit
 TOLERANCE = 1e-4
 #: a motion lies on a curve if it is off by no more than this, relative to its size, and the error of the interpolation
 _ON_CURVE = 1e-3
+#: amplitude, unit of length, up to which a motion is rest here: that of located branch points of rest is rounding
+_NOTHING = 1e-12
+#: cosine of two null vectors beyond which they are one
+_PARALLEL = 0.99
+#: distance of the multipliers of two Neimark-Sacker points of one motion beyond which they are two
+_OTHER_PAIR = 1e-3
 #: steps in which the nearest place between two points of a curve is found (Gauss-Newton, from the chord)
 _PROJECTIONS = 4
 
@@ -214,3 +221,33 @@ def _turns(count: int, nu: int) -> ComplexArray:
     (2 nu, count, 1).
     """
     return np.exp(1j * np.pi / nu * np.multiply.outer(np.arange(2 * nu), np.arange(count)))[:, :, None]
+
+
+def same_event(a: Bifurcation, b: Bifurcation) -> bool:
+    """Whether two located bifurcations are one, met twice."""
+    if (a.kind, a.parameter_name) != (b.kind, b.parameter_name):
+        return False
+    if a.kind == "grazing" and len({item.contact and item.contact.element for item in (a, b)}) > 1:
+        return False
+    if a.kind == "NS" and abs(a.critical_multiplier() - b.critical_multiplier()) > _OTHER_PAIR:
+        return False
+    if a.multiplicity > 1 and a.multiplicity == b.multiplicity and not _along_one(a, b):
+        return False
+    same_place = all(np.isclose(a.parameter(name), b.parameter(name), rtol=1e-9) for name in a.free_names)
+    if not (same_place and np.isclose(a.amplitude, b.amplitude, rtol=1e-6)):
+        return False
+    # the mirror image of a motion has its amplitude; at rest there is nothing to compare
+    return max(a.amplitude, b.amplitude) <= _NOTHING or relation(a.orbit, b.orbit).one
+
+
+def _along_one(a: Bifurcation, b: Bifurcation) -> bool:
+    """Whether two bifurcations that fall together with others have one null vector."""
+    count = min(len(item.null_vectors.right) for item in (a, b))
+    return bool(abs(np.vdot(a.null_vectors.right[:count], b.null_vectors.right[:count])) > _PARALLEL)
+
+
+def drop_seam(items: list[Bifurcation]) -> None:
+    """What lies on the seam of a closed curve is met at both ends: keep the first."""
+    # several contacts may graze at once
+    while len(items) > 1 and any(same_event(items[-1], first) for first in items[: min(3, len(items) - 1)]):
+        items.pop()
