@@ -250,3 +250,34 @@ def test_cycles_that_grow_without_bound_end_after_orders_of_magnitude():
     fastest = int(np.argmax(cycles.omega))
     assert 1e3 < cycles.omega[fastest] / hopf.omega < 2e3
     assert cycles.parameter("mu")[fastest] == pytest.approx(0.50643 / 0.344606, abs=1e-2)
+
+
+def test_the_hopf_point_in_which_cycles_end_is_at_rest():
+    """Of a wing section whose cycles shrink to rest: what Newton's method leaves of zero is no motion."""
+    values = {
+        "xa": 0.25,
+        "r2": 0.25,
+        "zeta": 0.005,
+        "w": 0.4,
+        "mu": 0.1,
+        "e": 0.3,
+        "k3": 3.0,
+        "kh": 0.5,
+        "b": 0.3,
+        "U": 0.5,
+    }
+    system = so.System.from_equations(
+        [
+            "h'' + xa*a'' + 2*zeta*w*h' + w**2*(h+kh*h**3) + mu*U**2*a + mu*U*h' = 0",
+            "xa*h'' + r2*a'' + 2*zeta*r2*a' + r2*(a + k3*a**3) - mu*e*U**2*a - mu*e*U*h' + b*mu*U*a' = 0",
+        ],
+        values,
+    )
+    rest = so.equilibria(system, "U", (0.3, 2.5), observe="a")
+    begins = rest.bifurcations["Hopf"][0]
+    cycles = so.limit_cycles(begins, bounds=(0.3, 2.5), observe="a")
+    (end,) = cycles.bifurcations["Hopf"]
+    assert end.parameter("U") == pytest.approx(begins.parameter("U"), abs=1e-9)
+    assert end.amplitude == end.residual == 0.0
+    assert not end.orbit.coefficients.any()
+    assert so.verify(end).agrees

@@ -25,6 +25,8 @@ from suboctave.harmonic.truncation import truncation
 
 #: how far a Hopf point may lie from the cycles that end in it, in units of the motion and of the parameter's range
 _BESIDE = 0.1
+#: position of rest, in units of the cycles beside it, that is rounding
+_ROUNDING = 1e-12
 
 
 def hopf_beside(a: Sample, b: Sample) -> TrackedEvent:
@@ -37,10 +39,14 @@ def hopf_beside(a: Sample, b: Sample) -> TrackedEvent:
     moved = abs(guess.value(state) - guess.parameter) / curve.span, abs(found.kappa / rate - 1.0)
     if max(moved) > _BESIDE:
         raise ConvergenceError(f"the Hopf point found lies elsewhere, at {name} = {guess.value(state):.6g}")
-    known = dict(state.values), found.balance_residual, truncation(state)
-    orbit = stilled(PeriodicOrbit(state.balance, state.x, state.omega, *known, None))
+    residual, own = found.residual, found.balance_residual
+    x = state.x
+    if np.abs(x).max() <= _ROUNDING * np.abs(near.state.x).max():
+        # the position of rest is zero but for what Newton's method leaves of it
+        x, residual, own = np.zeros_like(x), 0.0, 0.0
+    orbit = stilled(PeriodicOrbit(state.balance, x, state.omega, dict(state.values), own, truncation(state), None))
     return TrackedEvent(
-        "Hopf", orbit, found.floquet, found.residual, 0.0, name, found.vectors, found.kappa,
+        "Hopf", orbit, found.floquet, residual, 0.0, name, found.vectors, found.kappa,
         curve=curve.augmentation.name, names=curve.names,
     )  # fmt: skip
 
