@@ -115,3 +115,11 @@ def test_neither_load_nor_excitation_is_refused():
     system = so.System.from_equations("x'' + 0.1*x' + x + x**3 = 0")
     with pytest.raises(so.InputError, match="no periodic load"):
         so.frequency_response(system, (0.5, 1.5))
+
+
+@pytest.mark.parametrize("omega", [(1.1, 0.8), (0.8, 1.1)])
+def test_a_response_to_a_force_of_an_element_begins_without_a_doubt(omega):
+    """A plate between electrodes: no load moves it, and the guess at rest has no size to measure the motion by."""
+    force = so.Expression(0, "-b*(V+a*cos(omega*t))**2/(1-x)**2")
+    curve = so.frequency_response(so.System(1.0, 0.02, 1.0, [force], parameters={"b": 1.0, "V": 0.1, "a": 0.02}), omega)
+    assert not curve.warnings

@@ -263,7 +263,9 @@ def settled(
         weights = curve.weights(u, 0.0)
         solved = correct(curve, u, held(curve, u, weights), weights, newton)
         adapted = curve.adapted(solved.u, solved.evaluation)
-        if adapted.balance is curve.balance:
+        # a guess at rest has no units for a motion
+        measured = curve.size(u) > 0.0 or not curve.size(solved.u) > 0.0
+        if adapted.balance is curve.balance and measured:
             break
         u, curve = adapted.transfer(solved.u, curve), adapted
     return make_point(solved, curve, None, 0.0)

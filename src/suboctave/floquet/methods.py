@@ -194,6 +194,8 @@ def combined(a: FloquetResult, b: FloquetResult) -> tuple[FloquetResult, str]:
 
 def _overlap(p: complex, a: float, q: complex, b: float) -> tuple[complex, float, bool]:
     """Centre and radius of the smallest disc around the overlap of two discs; around both where there is none."""
+    # beyond all numbers infinity, without a word
+    p, a, q, b = complex(p), float(a), complex(q), float(b)
     if b > a:
         p, a, q, b = q, b, p, a
     d = abs(q - p)
