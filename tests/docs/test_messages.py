@@ -115,7 +115,7 @@ def _known(text: str) -> bool:
 #: modules that print sentences about what was not settled, all of which are on the page
 SENTENCES = (
     *("curves/follow.py", "curves/guard.py", "curves/interior.py", "curves/ledgers.py", "curves/refine.py"),
-    *("curves/tracked/corners.py", "curves/tracked/ends.py", "curves/tracked/follow.py", "floquet/hill.py"),
+    *("curves/corners.py", "curves/tracked/ends.py", "curves/tracked/follow.py", "floquet/hill.py"),
     *("maps/regimes/verb.py", "timedomain/flow.py"),
 )
 #: parts of sentences that are on the page
