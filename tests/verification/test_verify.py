@@ -89,3 +89,14 @@ def test_stability_of_one_motion(rattling_curve):
         assert result.multipliers == pytest.approx(rattling_curve.multipliers[at], abs=1e-12)
         assert result.stable == rattling_curve.stable[at]
         assert so.stability(rattling_curve.points[at]).stable == result.stable
+
+
+def test_a_motion_too_unstable_to_be_shot_is_not_wrong():
+    """Of a plate between electrodes close to them, with a multiplier of 1e14."""
+    forces = [so.CubicSpring(0, "a"), so.Expression(0, "-b*(Vd+Va*cos(omega*t))**2/(1-x)**2")]
+    system = so.System(1.0, 0.02, 1.0, forces, parameters={"a": 0.3, "b": 0.1, "Vd": 0.6, "Va": 0.25})
+    curve = so.frequency_response(system, (1.0, 0.38), harmonics=21)
+    check = so.verify(curve.points[-1])
+    assert check.outcome == "cannot tell"
+    assert "as large as the motion within its period" in check.reason
+    assert so.verify(curve.points[0]).agrees

@@ -30,6 +30,8 @@ from suboctave.verification.result import AGREES, DISAGREES, OPEN
 LOCATED = ("LP", "BP", "PD", "NS")
 #: how far along the curve of motions one is searched, in tolerances, and the passes through it that may be spent
 _REACH, _PASSES = 100.0, 120
+#: share of a motion that its start in time may be off by, whatever its harmonics are
+_DIGITS = 1e-12
 #: displacements of a motion that are held in memory at once
 _AT_ONCE = 10_000_000
 
@@ -111,6 +113,10 @@ def verify_motion(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: fl
             solution = _by_shooting(system, motion, kind, start, tolerance)
     except ConvergenceError as failure:
         what_failed = "shooting found no motion from here" if kind is None else "shooting did not locate it"
+        largest = float(np.abs(floquet.multipliers).max(initial=0.0))
+        if kind is None and largest * max(motion.truncation, _DIGITS) > 1.0:
+            reason = f"A multiplier of {largest:.1e} makes what is left out as large as the motion within its period"
+            return Verification(math.inf, math.inf, None, OPEN, None, f"{reason}: {what_failed}", projection)
         return Verification(math.inf, math.inf, None, DISAGREES, None, f"{what_failed}: {failure}", projection)
     distance = max(distance_of(system, motion, start, solution), solution.residual)
     if isinstance(what, Bifurcation) and touches:
