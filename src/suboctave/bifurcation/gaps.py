@@ -8,7 +8,7 @@ displacement, and its gap 0. Elements that act along the same direction share on
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -18,7 +18,7 @@ from suboctave.harmonic.aft.channel import Channel
 from suboctave.harmonic.aft.closed_form import corner_weights
 from suboctave.harmonic.aft.corners import FLAT, Corner, gaps_of, jump, rates_of_state, surface_at
 from suboctave.harmonic.aft.general import GeneralLaw
-from suboctave.harmonic.aft.law import LocalMotion
+from suboctave.harmonic.aft.law import LocalMotion, Member
 from suboctave.harmonic.basis import Array
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.quadrature import search_grid
@@ -55,23 +55,28 @@ def gap_extrema(state: BalanceState) -> tuple[GapExtrema, ...]:
         if own:
             turns = extrema(series, *grid)
             gaps += [GapExtrema(element, place, level, *turns) for element, place, level in own]
+    known: set[Hashable] = set()
     for channel in state.own_channels:
         for law, member in channel.members():
             if isinstance(law, GeneralLaw) and isinstance(member.kind, CornerSampling):
-                gaps += _at_corners(law, member.number, gaps)
+                gaps += _at_corners(law, member, channel.ins.tobytes(), known)
             elif places := levels_of(member.kind, member.coefficients):
                 turns = extrema(channel.along.motion, *grid)
                 gaps += [GapExtrema(member.number, place, level, *turns) for place, level in enumerate(places)]
     return tuple(gaps)
 
 
-def _at_corners(law: GeneralLaw, element: int, known: list[GapExtrema]) -> list[GapExtrema]:
+def _at_corners(law: GeneralLaw, member: Member, reads: bytes, known: set[Hashable]) -> list[GapExtrema]:
     """The gaps of a law with corners, but for surfaces that another element has as well: a ring around a shaft."""
     found: list[GapExtrema] = []
     for index, corner in enumerate(gaps_of(law)):
-        turns, others = corner.turns, (*known, *found)
-        if not (corner.row and any(np.array_equal(turns[1], one.value) and not one.level for one in others)):
-            found.append(GapExtrema(element, index, corner.level, *turns))
+        if corner.row:
+            own = as_coupled(member.element).surface_key(corner.row - law.along.size, member.coefficients)
+            key = None if own is None else (reads, own)
+            if key in known:
+                continue
+            known |= set() if key is None else {key}
+        found.append(GapExtrema(member.number, index, corner.level, *corner.turns))
     return found
 
 
@@ -326,8 +331,8 @@ class GrazingContact:
 
 def read_direction(state: BalanceState, element: int) -> Array:
     """The displacement that an element's gaps are places of, in the unknown DOFs."""
-    system = state.balance.system
-    return state.linear.retain(reads(system.elements[element], system.n))
+    first: Array = state.balance.group_of[element].inputs[0]
+    return first
 
 
 def basis_rows(high: int, tau: float) -> tuple[Array, Array, Array]:

@@ -144,6 +144,11 @@ class Equations:
         return self._along[dof]
 
     @lazy
+    def group_of(self) -> dict[int, Group]:
+        """The group of every element, by its number."""
+        return {member: group for group in self.all_groups for member in group.members}
+
+    @lazy
     def directions(self) -> Sparse:
         """Where the forces of all channels act, as the kernels want it."""
         return sparse(self.acting)

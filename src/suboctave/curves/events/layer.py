@@ -186,9 +186,7 @@ def _grazings_near(guess: Guess, young: bool) -> Iterator[tuple[Touch, Grazing, 
     state = guess.state
     mass = state.linear.equation_of_motion()[0]
     for gap in gap_extrema(state):
-        acting = state.linear.expand(
-            state.linear.retain(state.local(gap.element).element.direction(state.balance.system.n))
-        )
+        acting = state.linear.expand(state.balance.group_of[gap.element].direction)
         size = float(np.abs(gap.value).max(initial=0.0))
         for tau, value, curve in zip(gap.tau, gap.value, gap.curve, strict=True):
             beyond = value - gap.level

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import functools
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -86,6 +86,10 @@ class CoupledElement(BaseElement):
         surface = self.surface(which, q, theta, c)
         return surface.value, surface.normal, surface.by_phase
 
+    def surface_key(self, which: int, c: Array) -> Hashable | None:
+        """What the same function of the same inputs of another element has as well; None if that is not known."""
+        return None
+
 
 def _without_surfaces(element: BaseElement) -> InputError:
     return InputError(f"{element.label}: sampling tells of corners at surfaces, so its class must define surface()")
@@ -142,6 +146,9 @@ class _OneInput:
 
     def surface_slopes(self, which: int, q: Array, theta: Array, c: Array) -> tuple[Array, Array, Array]:
         raise _without_surfaces(self.element)
+
+    def surface_key(self, which: int, c: Array) -> Hashable | None:
+        return None
 
 
 def _rows(u: Array, parts: Sequence[Array | None]) -> list[Array]:
@@ -250,3 +257,6 @@ class Expression(CoupledElement):
 
     def surface_slopes(self, which: int, q: Array, theta: Array, c: Array) -> tuple[Array, Array, Array]:
         return self._law.surface_slopes(which, q, theta, c)
+
+    def surface_key(self, which: int, c: Array) -> Hashable | None:
+        return self._law.surface_key(which, c)

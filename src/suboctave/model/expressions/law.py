@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -293,6 +293,16 @@ class Law:
         values = self._code(f"surface {which}, more", parts)(q, theta, c)
         bend, normal_by_phase, by_c = np.split(values, [size * size, size * size + size])
         return Surface(value, normal, bend.reshape(size, size, -1), by_phase, normal_by_phase, by_c)
+
+    def surface_key(self, which: int, c: Array) -> Hashable:
+        """See `CoupledElement.surface_key`."""
+        text, numbers = self._surface_texts[which]
+        return text, *c[numbers].tolist()
+
+    @functools.cached_property
+    def _surface_texts(self) -> list[tuple[str, list[int]]]:
+        """Every function of a surface as a text, and which coefficients occur in it."""
+        return [(str(phi), [i for i, one in enumerate(self.c) if one in phi.free_symbols]) for phi in self._surfaces]
 
     def surface_slopes(self, which: int, q: Array, theta: Array, c: Array) -> tuple[Array, Array, Array]:
         """See `CoupledElement.surface_slopes`."""
