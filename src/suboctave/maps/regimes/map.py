@@ -533,12 +533,19 @@ def _sizes(regimes: RegimeMap) -> tuple[Array, Array]:
 
 
 def _passes(orbit: PeriodicOrbit, state: Array) -> bool:
-    """Whether a motion has a state (2n,) at the beginning of some period of the load."""
+    """Whether a motion has a state (2n,) at the beginning of some period of the load, degrees of freedom counting by
+    their masses: of a structure hundreds hardly move.
+    """
     t = np.linspace(0.0, orbit.period, orbit.basis.nu, endpoint=False, dtype=np.float64)
-    states = np.concatenate((orbit.displacement(t), orbit.velocity(t)))
-    extent = _extent(orbit)
-    off = np.linalg.norm((states - state[:, None]) / np.where(extent > 0.0, extent, 1.0)[:, None], axis=0)
-    return bool(off.min() <= _SAME)
+    system = orbit.balance.system
+    masses = np.abs(system.mass.sparse_value(orbit.values).diagonal())
+    off = np.zeros(orbit.basis.nu)
+    halves = zip(
+        (orbit.displacement(t), orbit.velocity(t)), np.split(state, 2), np.split(_extent(orbit), 2), strict=True
+    )
+    for reached, given, extent in halves:
+        off += (masses @ (reached - given[:, None]) ** 2) / (float(masses @ extent**2) or 1.0)
+    return bool(off.min() <= _SAME**2)
 
 
 def _extent(orbit: PeriodicOrbit) -> Array:
