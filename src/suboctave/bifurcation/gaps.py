@@ -16,7 +16,7 @@ import numpy as np
 
 from suboctave.harmonic.aft.channel import Channel
 from suboctave.harmonic.aft.closed_form import corner_weights
-from suboctave.harmonic.aft.corners import FLAT, Corner, gaps_of, jump, rates_of_state, surface_at
+from suboctave.harmonic.aft.corners import Corner, gaps_of, jump, rates_of_state, surface_at
 from suboctave.harmonic.aft.general import GeneralLaw
 from suboctave.harmonic.aft.law import LocalMotion, Member
 from suboctave.harmonic.basis import Array
@@ -139,7 +139,7 @@ class Height(NamedTuple):
 def height_at(state: BalanceState, element: int, index: int, tau: float, names: Sequence[str] = ()) -> Height:
     """The height of an element over one of its gaps at an instant."""
     if (surface := _surface_of(state, element, index)) is not None:
-        if surface[2].turns[2, 0] != -FLAT:
+        if not surface[2].everywhere:
             return _over_surface(state, element, *surface, tau, names)
         every = [_over_surface(state, element, *surface, at, names) for at in search_grid(state.basis.harmonics).tau]
         height, _, _, by_x, _, by_names, _ = (sum(part) / len(every) for part in zip(*every, strict=True))
@@ -168,6 +168,7 @@ def _over_surface(
     state: BalanceState, element: int, channel: Channel, law: GeneralLaw, corner: Corner, tau: float,
     names: Sequence[str],
 ) -> Height:  # fmt: skip
+    """The value of a surface's function at an instant."""
     rows = basis_rows(state.basis.harmonics, tau)
     zr, zi = np.cos([tau]), np.sin([tau])
     q, theta = law.state_at(zr, zi)

@@ -129,8 +129,8 @@ class _Follower(Driver):
         hooks = self._clear, self._arrived, self._finer
         options = bounds, settings.newton, settings.stepping, *hooks
         self.march = March(start, direction, *options)
-        #: goes on from a point behind a corner
         headed = start.turned if start.tangent[start.curve.parameter] * direction < 0.0 else start
+        #: goes on from a point behind a corner
         self._from = lambda point: March(point, 0.0, *options, home=headed)
         #: size of the last motion at which the parameter moved, or of the first, and how much larger motions may become
         self._size: tuple[float, float] | None = None

@@ -333,7 +333,7 @@ class Interior(ABC):
         return [*left, p, q, *right], len(left)
 
     def _beside(self, start: int, way: int, h: float) -> tuple[list[Sample], Sample | None]:
-        """Up to three of the four samples beyond one, neither too close together nor too far for an interval of length
+        """Up to three of the six samples beyond one, neither too close together nor too far for an interval of length
         h, as far as the functions go on smoothly; and the first one beyond.
         """
         chosen: list[Sample] = []

@@ -22,7 +22,7 @@ import numpy as np
 from suboctave.floquet.time_mesh import NODES, ORDER
 from suboctave.harmonic.aft.channel import Channel
 from suboctave.harmonic.aft.closed_form import NO_ROWS
-from suboctave.harmonic.aft.corners import FLAT, Corner, surface_at
+from suboctave.harmonic.aft.corners import Corner, surface_at
 from suboctave.harmonic.aft.general import GeneralLaw
 from suboctave.harmonic.aft.table import Probe
 from suboctave.harmonic.basis import Array, ComplexArray
@@ -153,7 +153,7 @@ class Channels:
             theta = nodal.along.nu * np.arctan2(-slope / nodal.along.rate, cosine)
         for corner in nodal.corners:
             # what reaches a corner everywhere at once would have its sides by rounding
-            if corner.turns[2, :1].sum() == -FLAT and abs(corner.turns[1, 0]) < _SLICE * np.abs(q).max():
+            if corner.everywhere and abs(corner.turns[1, 0]) < _SLICE * np.abs(q).max():
                 surface = surface_at(nodal, corner, q, theta)
                 below = surface.value + _SLICE * np.abs(q).max()
                 q = q - below / (surface.normal**2).sum(axis=0) * surface.normal

@@ -32,9 +32,8 @@ size does nothing to the law.
 
 At a limit point, which the multipliers of the motion as it stands tell, there is no such step: a motion of the same
 frequency is far away, or there is none. What the step moves along the direction of the multiplier near +1 is then left
-out, and belongs to the error: with the gap
-`g = 1 - mu` and the shift D of the multiplier to first order, the motions near a fold leave `g^2 - 2 g D` for the
-square of the gap, so that the shift is at most about `sqrt(2 g |D|)`.
+out, and belongs to the error: with the gap `g = 1 - mu` and the shift D of the multiplier to first order, the motions
+near a fold leave `g^2 - 2 g D` for the square of the gap, so that the shift is at most about `sqrt(2 g |D|)`.
 
 Where nothing drives a motion, it may be shifted in time: the multiplier of that direction is +1, and what the step
 moves along it, which changes the phase alone, is left out.

@@ -67,6 +67,11 @@ class Corner(NamedTuple):
     second: Array
     turns: Array
 
+    @property
+    def everywhere(self) -> bool:
+        """Whether phi stays as it is along the motion, so that the corner is reached everywhere at once."""
+        return bool((self.turns[2, :1] == -FLAT).any())
+
 
 class Comb(NamedTuple):
     """Dirac functions at a corner: the instants, what phi does there, and the weights `eta / |phi'|`."""
