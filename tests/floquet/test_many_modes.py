@@ -95,8 +95,17 @@ def before(state):
     mu, errors = motion.others()
     own, left, right = eig(motion.before, left=True, right=True)
     # a matrix that changes moves an eigenvalue by so many times as much
-    condition = 1.0 / np.abs(np.sum(left.conj() * right, axis=0))
-    least = (1e-8 + condition * motion.neglected) * max(1.0, np.abs(own).max(initial=0.0))
+    shares = left.conj() * right
+    condition = 1.0 / np.abs(np.sum(shares, axis=0))
+    # without those in which what stands in for fast modes has most part
+    strange = np.abs(np.sum(shares[motion.own :], axis=0)) * condition
+    kept = np.argsort(strange)[: motion.own]
+    ahead, behind = (
+        np.linalg.norm(vectors[: motion.own] * missing[:, None], axis=0)
+        for vectors, missing in zip((left, right), motion.missing, strict=True)
+    )
+    least = 1e-8 * np.abs(own).max(initial=1.0) + np.abs(own) * ahead * behind * condition
+    own, least = own[kept], least[kept]
     return motion, np.concatenate((own, mu)), np.concatenate((least, errors))
 
 
@@ -124,7 +133,8 @@ def test_all_modes_with_states(kind, monkeypatch):
         system, directions = structure(7, 120.0, 2, kind, seed)
         state = motion_of(system, 9, 1.1, seed)
         motion, mu, errors = before(state)
-        assert motion.neglected == 0.0
+        assert motion.own == motion.size
+        assert not motion.missing.any()
         assert len(motion.spans) < 40
         difference, _ = differences(mu, errors, exact(system, directions, state))
         assert difference.max() < 1e-11

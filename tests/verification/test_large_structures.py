@@ -46,10 +46,15 @@ def test_motions_agree(stop):
 
 
 def test_a_smooth_law(spring):
-    check = so.verify(max(spring.points, key=lambda p: p.orbit.amplitude(TIP)))
+    point = max(spring.points, key=lambda p: p.orbit.amplitude(TIP))
+    check = so.verify(point)
     assert check.agrees
     assert check.distance < 1e-5
-    assert check.multiplier_error < 1e-5
+    # the fastest vibrations of the chain have no states of their own: multipliers say what that may do to them
+    mu, errors = point.floquet.multipliers, point.floquet.errors
+    apart = np.abs(mu[:, None] - check.solution.multipliers).min(axis=1)
+    assert np.all(apart <= errors + 1e-6)
+    assert check.multiplier_error < 1e-4
 
 
 def test_bifurcations_are_located_again(stop):

@@ -10,23 +10,13 @@ L an eigenvalue, or a 2 x 2 matrix with two eigenvalues that are conjugate or li
 left as they are, `z = (s y, y')`, which critical damping and free masses need. Exponentials of blocks are known in
 closed form: `exp(L t) = e_0(t) + e_1(t) L`.
 
-Blocks come in the order of their rates |lambda|. Those that are too fast for a motion follow the forces at once,
-`q = R F` with their flexibility `R = -G L^-1 B`, and count no state. Blocks that no channel both reads and drives
-change no multiplier and come last.
-
-While channels have a constant stiffness, `F = K q + F'` between the instants at which contacts begin and end, the
-motion is linear with constant coefficients as well: with `M = (1 - R K)^-1`,
-
-    z' = (L + B K M G) z + B (1 - K R)^-1 F',    q = M G z + M R F',
-
-which eigenvectors separate into blocks again, a `Form` of the structure. The forms along a period, one after the other,
-make the motion of a structure with stops a product of exact exponentials.
+Blocks come in the order of their rates |lambda|. For those that are too fast for a motion others stand in (`levels`).
+Blocks that no channel both reads and drives change no multiplier and come last.
 """
 
 from __future__ import annotations
 
 from functools import lru_cache
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -41,9 +31,7 @@ from suboctave.harmonic.linear_part import LinearPart
 _APART = 0.3
 #: product of reading and driving, relative to the largest, of a block that does not take part
 _UNCOUPLED = 1e-28
-#: condition of eigenvectors beyond which rounding would be seen in multipliers: contacts are then followed by panels
-_PARALLEL = 1e6
-_EPS, _TINY = float(np.finfo(float).eps), float(np.finfo(float).tiny)
+_EPS = float(np.finfo(float).eps)
 
 
 class Blocks(NamedTuple):
@@ -57,8 +45,6 @@ class Blocks(NamedTuple):
         Largest |lambda| of every block, (B,).
     decays
         Largest real part of the eigenvalues of every block, (B,).
-    steepest
-        The least of these among the blocks before each, (B + 1,), as numbers.
     exponents
         All eigenvalues, in the order of the states, (S,).
     driven
@@ -67,14 +53,8 @@ class Blocks(NamedTuple):
         G and G', (2, G, S).
     flexibility
         -G L^-1 B of every block, (B, G, G); of one that is free to move, or does not take part, zero.
-    flexible
-        R, the sum of these, if this block is the first without states, (B + 1, G, G).
     coupling
         G B and G L B of every block, (B, 2, 2 G G), by q and q', channels that read and that drive.
-    sizes
-        How far a force in a channel drives a block, and how much of a block a channel reads, (2, B, G).
-    turning
-        Largest entry of G B, relative to these: zero for a mode, and -1 for blocks of a single state.
     stiffening
         How much an impulse of stiffness in a channel adds to squared rates by the blocks before each, (B + 1, G).
     shifting
@@ -91,15 +71,11 @@ class Blocks(NamedTuple):
     first: np.ndarray
     rates: Array
     decays: Array
-    steepest: list[float]
     exponents: ComplexArray
     driven: Array
     read: Array
     flexibility: Array
-    flexible: Array
     coupling: Array
-    sizes: Array
-    turning: Array
     stiffening: Array
     shifting: ComplexArray
     coupled: int
@@ -197,7 +173,7 @@ def _add_coupled(parts: _Parts, which: np.ndarray, k: Array, c: Array) -> float:
     scale = np.sqrt(np.abs(k.diagonal()))
     scale = np.where(scale > 0.0, scale, 1.0)
     matrix = np.block([[np.zeros((n, n)), np.diag(scale)], [-k / scale, -c]])
-    basis, inverse, found = _separated(matrix)
+    basis, inverse, found = separated(matrix)
     weights = np.concatenate((scale, np.ones(n)))
     states, at = np.concatenate((which, which + parts.count // 2)), 0
     for block in found:
@@ -209,7 +185,7 @@ def _add_coupled(parts: _Parts, which: np.ndarray, k: Array, c: Array) -> float:
     return float(np.linalg.cond(basis))
 
 
-def _separated(matrix: Array) -> tuple[Array, Array, list[Array]]:
+def separated(matrix: Array) -> tuple[Array, Array, list[Array]]:
     """Real eigenvectors in columns, two for conjugate eigenvalues, their inverse, and the blocks that they make."""
     values, vectors = np.linalg.eig(matrix)
     keep = values.imag >= 0.0
@@ -248,25 +224,19 @@ def _arranged(parts: _Parts, n: int, left: Array, right: Array, active: np.ndarr
     out = np.concatenate([read[i] for i in order], axis=2)
     driving = np.array([np.linalg.norm(driven[i], axis=0) for i in order])
     reading = np.array([np.linalg.norm(read[i], axis=2) for i in order])
-    sizes, stiffening = np.stack((driving, reading[:, 0])), np.zeros((len(order) + 1, groups))
+    stiffening = np.zeros((len(order) + 1, groups))
     stiffening[1:] = np.cumsum(driving * reading[:, 1], axis=0)
     coupling = np.zeros((len(order), 2, 2, groups, groups))
     for b, i in enumerate(order):
         coupling[b, 0], coupling[b, 1] = read[i] @ driven[i], read[i] @ parts.matrices[i] @ driven[i]
-    most = np.maximum(sizes.max(axis=2, initial=0.0).prod(axis=0), _TINY)
-    turning = np.where(np.diff(first) > 1, np.abs(coupling[:, 0, 0]).max(axis=(1, 2), initial=0.0) / most, -1.0)
     decays = np.array([parts.exponents[i].real.max() for i in order])
     shifting = np.concatenate(
         [_shifting(coupling[b, 0], coupling[b, 1], parts.exponents[i]) for b, i in enumerate(order)], axis=1
     )
-    steepest = [0.0, *np.minimum.accumulate(decays).tolist()]
     exponents = np.concatenate([parts.exponents[i] for i in order])
-    flexible = np.zeros((len(order) + 1, groups, groups))
-    flexible[:-1] = flexibility[::-1].cumsum(axis=0)[::-1]
     return Blocks(
-        motion, first, rates[order], decays, steepest, exponents, into, np.ascontiguousarray(out), flexibility,
-        flexible, coupling.reshape(len(order), 2, -1), sizes, turning, stiffening, shifting,
-        int(coupled.sum()), active, rounding,
+        motion, first, rates[order], decays, exponents, into, np.ascontiguousarray(out), flexibility,
+        coupling.reshape(len(order), 2, -1), stiffening, shifting, int(coupled.sum()), active, rounding,
     )  # fmt: skip
 
 
@@ -282,125 +252,3 @@ def _shifting(first: Array, second: Array, exponents: ComplexArray) -> ComplexAr
     if apart.imag == 0.0:
         return np.zeros((2, 2, trace.shape[1]), dtype=complex)
     return np.stack((product - exponents[1] * trace, exponents[0] * trace - product), axis=1) / apart
-
-
-class Form(NamedTuple):
-    """The blocks with states while channels have a constant stiffness; S states in B blocks, G channels.
-
-    motion, first, driven, read
-        See `Blocks`: (B, 2, 2), (B + 1,), (S, G), (2, G, S).
-    coupling
-        See `Blocks`, the blocks in a row: (2 G G, 2 B).
-    flexible
-        Of what has no states, (G, G).
-    out, back
-        The states of the free blocks from those of this form, and these from those, (S, S); empty if they are the same.
-    rounding
-        See `Blocks`.
-    """
-
-    motion: Array
-    first: np.ndarray
-    driven: Array
-    read: Array
-    coupling: Array
-    flexible: Array
-    out: Array
-    back: Array
-    rounding: float
-
-
-_SAME = np.empty((0, 0))
-
-
-@lru_cache(maxsize=128)
-def form_of(linear: LinearPart, groups: tuple[Group, ...], dynamic: int, held: tuple[float, ...]) -> Form | None:
-    """The first `dynamic` blocks with the stiffness `held` (G,) at the channels; None where eigenvectors are so nearly
-    parallel that digits would be lost.
-    """
-    blocks = in_blocks(linear, groups)
-    first, size, count = blocks.first[: dynamic + 1], blocks.first[dynamic], len(blocks.active)
-    free = Form(
-        blocks.motion[:dynamic], first, blocks.driven[:size], blocks.read[:, :, :size],
-        _in_a_row(blocks.coupling[:dynamic]), blocks.flexible[dynamic], _SAME, _SAME, 0.0,
-    )  # fmt: skip
-    if not any(held) or not size:
-        return free
-    stiffness, flexible, one = np.diag(held), free.flexible, np.eye(count)
-    raised = np.linalg.inv(one - flexible @ stiffness)
-    matrix = np.zeros((size, size))
-    for b in range(dynamic):
-        s, e = first[b], first[b + 1]
-        matrix[s:e, s:e] = blocks.motion[b, : e - s, : e - s]
-    matrix += free.driven @ (stiffness @ raised @ free.read[0])
-    try:
-        basis, inverse, found = _separated(matrix)
-    except np.linalg.LinAlgError:  # two of them are the same
-        return None
-    condition = float(np.linalg.norm(basis) * np.linalg.norm(inverse))
-    if not condition < _PARALLEL:
-        return None
-    driven = inverse @ free.driven @ np.linalg.inv(one - stiffness @ flexible)
-    read = np.stack((raised @ free.read[0] @ basis, free.read[1] @ basis))
-    motion, coupling, ends = np.zeros((len(found), 2, 2)), np.zeros((len(found), 2, 2 * count * count)), [0]
-    for b, block in enumerate(found):
-        s, e = ends[-1], ends[-1] + len(block)
-        motion[b, : e - s, : e - s] = block
-        coupling[b] = (read[:, :, s:e] @ driven[s:e]).ravel(), (read[:, :, s:e] @ block @ driven[s:e]).ravel()
-        ends.append(e)
-    return Form(
-        motion, np.array(ends), driven, read, _in_a_row(coupling), raised @ flexible, basis, inverse, condition * _EPS
-    )
-
-
-def _in_a_row(coupling: Array) -> Array:
-    blocks, two, pairs = coupling.shape
-    return np.ascontiguousarray(coupling.reshape(two * blocks, pairs).T)
-
-
-class Forms(NamedTuple):
-    """Forms one after the other, R of them: see `Form`, with an index more.
-
-    There are as many blocks as in the form with most: others have blocks without states behind them. `turns` (R + 1, S,
-    S) has the states of each form from those of the one before, the first and what comes after the last being free;
-    `turning` (R + 1,) where these are not the same.
-    """
-
-    motion: Array
-    first: np.ndarray
-    driven: Array
-    read: Array
-    coupling: Array
-    flexible: Array
-    turns: Array
-    turning: np.ndarray
-
-
-@lru_cache(maxsize=32)
-def forms_along(
-    linear: LinearPart, groups: tuple[Group, ...], dynamic: int, sequence: tuple[tuple[float, ...], ...]
-) -> tuple[Forms, float]:
-    """The forms of a sequence of stiffnesses (G,), and the largest of their relative errors by rounding; where there is
-    none for a stiffness, that of the free structure.
-    """
-    free = form_of(linear, groups, dynamic, (0.0,) * len(in_blocks(linear, groups).active))
-    assert free is not None
-    chosen = [form_of(linear, groups, dynamic, held) or free for held in sequence]
-    most, size = max(len(form.motion) for form in chosen), len(free.driven)
-    motion, first = np.zeros((len(chosen), most, 2, 2)), np.full((len(chosen), most + 1), size)
-    coupling = np.zeros((len(chosen), len(free.coupling), 2 * most))
-    for r, form in enumerate(chosen):
-        blocks = len(form.motion)
-        motion[r, :blocks], first[r, : blocks + 1] = form.motion, form.first
-        coupling[r, :, : 2 * blocks] = form.coupling
-    steps = list(pairwise([free, *chosen, free]))
-    turning = np.array([old is not new for old, new in steps])
-    turns = np.empty((len(turning) if turning.any() else 0, size, size))
-    for r in turning.nonzero()[0].tolist():
-        old, new = steps[r]
-        if new is free or old is free:
-            turns[r] = old.out if new is free else new.back
-        else:
-            np.dot(new.back, old.out, out=turns[r])
-    driven, read, flexible = (np.stack([getattr(f, name) for f in chosen]) for name in ("driven", "read", "flexible"))
-    return Forms(motion, first, driven, read, coupling, flexible, turns, turning), max(f.rounding for f in chosen)

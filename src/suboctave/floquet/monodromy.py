@@ -6,11 +6,11 @@ the constant stiffnesses of contacts in them:
 
     y'' + C y' + K y = - sum_g left_g (k_g q_g + c_g q_g' + r_g),    q_g = right_g^T y,
 
-Blocks that are too fast for the motion follow the forces at once, like springs, and their multipliers are those of the
+For blocks that are too fast for the motion a few others stand in (`levels`), and their multipliers are those of the
 motion with the means of stiffness and damping, to first order. How far that moves the others follows to first order
-from the spectra of stiffness and damping (`resolution.moved_without`): it decides which blocks are meant, and belongs
-to the errors, the more the less multipliers are apart. So does the share of the correction below that such blocks
-make. Perturbations that decay while no channel acts need not be followed either: the period begins with the longest
+from the spectra of stiffness and damping (`levels.moved_without`): it decides which blocks are meant, and belongs to
+the errors, the more the less multipliers are apart. So does the share of the correction below that such blocks make.
+Perturbations that decay while no channel acts need not be followed either: the period begins with the longest
 such time.
 
 Here r is the force that the motion leaves unbalanced. All elements along one direction are one channel. Laws that their
@@ -47,18 +47,13 @@ import numpy as np
 import scipy.linalg
 from scipy.linalg import lapack
 
-from suboctave.floquet.blocks import form_of, forms_along, in_blocks
 from suboctave.floquet.channels import BLIND, Channels
 from suboctave.floquet.exponentials import TURNS, structure
+from suboctave.floquet.forms import form_of, forms_along
+from suboctave.floquet.left_out import beyond, motions, poles
+from suboctave.floquet.levels import Along, levels_of
 from suboctave.floquet.propagate import closed, march, multipliers_and_shifts, response
-from suboctave.floquet.resolution import (
-    ACCURACY,
-    divided,
-    longest_rest,
-    moved_without,
-    states_needed,
-    stretches,
-)
+from suboctave.floquet.resolution import ACCURACY, divided, longest_rest, stretches, tolerated
 from suboctave.floquet.result import FloquetResult
 from suboctave.floquet.structural import with_structural_damping
 from suboctave.floquet.time_mesh import (
@@ -76,9 +71,9 @@ from suboctave.harmonic.quadrature import search_grid, singular_instants
 from suboctave.interruption import check_time
 from suboctave.lazy import lazy
 
-#: how far blocks without states may move multipliers, and how much further where a force is left unbalanced altogether,
-#: which does more
-_NEGLECTED = (3e-5, 3e-4)
+#: how far what is left out of a structure may move multipliers, and how much further where a force is left unbalanced
+#: altogether, which does more
+_NEGLECTED = (1e-5, 3e-4)
 #: longest panels in units of the time scales of the forces, of the blocks as channels see them, and of the blocks; how
 #: much less these count if they are seen little, as a power: with them multipliers are good for 1e-8
 _LENGTHS = (1.2, 1.8, TURNS, 1.0 / 12.0)
@@ -86,6 +81,8 @@ _LENGTHS = (1.2, 1.8, TURNS, 1.0 / 12.0)
 _FORGOTTEN = math.log(1e-14)
 #: how often panels are made shorter, as what is seen between their nodes needs it
 _DIVIDED = 6
+#: phase up to which jumps happen at once, and between jumps where it is not known when they are
+_AT_ONCE, _BLINDLY = 1e-2, 0.3
 _TINY = float(np.finfo(float).tiny)
 _NO_PASSAGES = np.zeros((2, 0))
 _NO_MULTIPLIERS = np.empty(0, dtype=complex), np.empty(0)
@@ -109,18 +106,22 @@ class _Linearised:
         The channels with a force, (A,).
     coupled
         Whether any channel has stiffness or damping.
-    neglected
-        How far blocks without states may move multipliers, relative to the largest.
+    own
+        How many of these are the structure's own, the first ones; others stand in for faster ones.
+    missing
+        How far what is left out of the structure moves multipliers, see `propagate.multipliers_and_shifts`.
     before
         Monodromy matrix along the motion as it stands, (size, size).
+    standing
+        Its multipliers, (own,), known with those of the motion corrected.
     """
 
     def __init__(self, state: BalanceState) -> None:
         balance = state.balance
         self.state = state
         own = self._own = Channels(state)
-        self._structure = state.linear, balance.all_groups
-        self._blocks = blocks = in_blocks(*self._structure)
+        self._levels = levels_of(state.linear, balance.all_groups)
+        self._blocks = blocks = self._levels.blocks
         self._laws = laws = PackedLaws(state.laws.groups, own.probes) if own.probes else state.packed
         self._motions, self._forces, self.active = state.motions, state.force_spectra, blocks.active
         if own.probes:
@@ -140,51 +141,65 @@ class _Linearised:
         ]
         passages = np.concatenate(passed, axis=1) if passed else _NO_PASSAGES
         self._held = np.empty((2, len(self.active)))
-        self._moved = moved_without(
-            state.tangent_spectra, blocks.active, state.rate, blocks.exponents, blocks.first, blocks.sizes,
-            blocks.turning, blocks.coupled, (state.basis.harmonics + 0.5) * state.rate, sum(_NEGLECTED),
-        )  # fmt: skip
+        self._beyond = (state.basis.harmonics + 0.5) * state.rate
         events = events_along(self._motions, laws.pieces, laws.owner, passages, grid.zr, grid.zi)
         events = own.marked(events, laws.owner)
         self.events = events[np.argsort(events[:, 0], kind="stable")]
         panels, start = panels_between(self.events, longest)
         self._evaluated(panels)
+        self._choice = self._levels.least_work(self._along(), self._beyond, self._tolerable)
+        self._level = self._choice.level
+        self._contacts()
         for _ in range(_DIVIDED):
             finer, begins = self._divided(panels, start)
             if len(finer) == len(panels):
                 break
             panels, start = finer, begins
             self._evaluated(panels)
+            self._contacts()
         rest = 0.0
-        if blocks.steepest[self._dynamic] * 2.0 * math.pi < _FORGOTTEN * state.rate:
+        if self._level.steepest * 2.0 * math.pi < _FORGOTTEN * state.rate:
             first, rest = longest_rest(self.spans, self.law, self.base, self.active, start)
             panels, start = np.roll(panels, -first, axis=0), (start - first) % len(panels)
             self._evaluated(panels)
+            self._contacts()
         self.start = start
         own.locate(self.events, start, laws.owner, len(panels))
         self._propagate(rest)
+
+    def _along(self) -> Along:
+        """What tells which blocks need states."""
+        state, blocks = self.state, self._blocks
+        known = motions(state.tangent_spectra, blocks.active, state.rate, poles(blocks), blocks.coupled)
+        # between jumps of stiffness that follow one another; what happens at once is one
+        at = self.events[np.isinf(self.events[:, 1]), 0]
+        after = np.diff(at, append=at[:1] + 2.0 * math.pi)
+        waits = np.append(after[after > _AT_ONCE], _BLINDLY) if self._kinked else after[after > _AT_ONCE]
+        return Along(known, state.rate, (state.tangent_spectra.shape[2] - 0.5) * state.rate, waits / state.rate)
 
     def _propagate(self, rest: float) -> None:
         """Perturbations over the period along the motion as it stands, and where the periodic response begins; no
         channel acts for a time `rest` at first.
         """
-        blocks, dynamic, channels = self._blocks, self._dynamic, len(self.active)
-        self._kept = np.arange(blocks.first[dynamic])
+        level, channels = self._level, len(self.active)
+        self._kept = np.arange(level.states)
         if rest > 0.0:
-            lasting = blocks.decays[:dynamic] * rest >= _FORGOTTEN
-            self._kept = np.flatnonzero(np.repeat(lasting, np.diff(blocks.first[: dynamic + 1])))
+            self._kept = np.flatnonzero(np.repeat(level.decays * rest >= _FORGOTTEN, np.diff(level.first)))
         self.size = size = len(self._kept)
-        self._forms, self._turned = forms_along(*self._structure, dynamic, self._sequence)
+        self.own = int(np.searchsorted(self._kept, level.own))
+        shifts = np.repeat(self._choice.shifts, np.diff(level.first[: level.slow + 1]))
+        self.missing = (np.sqrt(shifts) * level.sizes)[:, self._kept[: self.own]]
+        self._forms, self._turned = forms_along(self._level, self._sequence)
         self._structures = structure(self.spans, self._stretch, self._forms)
         self._acting = np.empty((len(self.spans), channels), dtype=bool)
         self._solved = np.empty((len(self.spans), channels * ORDER, size + 1))
-        self._states = np.empty((len(self.spans), blocks.first[dynamic], size + 1))
+        self._begins = np.empty((len(self.spans), level.states, size + 1))
         self._whole = self._march(self.law, np.zeros(self.base.shape), size + 1)
         self.before, self._start = np.empty((size, size)), np.empty((size, 1))
         closed(self._whole, self._kept, self.before, self._start)
 
     def _evaluated(self, panels: Array) -> None:
-        """Evaluate all laws on panels, and which blocks have states."""
+        """Evaluate all laws on panels."""
         laws, count, channels = self._laws, len(panels), len(self._motions)
         nodes = count * (ORDER - 1) + 1
         self.spans, self.path = np.empty((count, ORDER)), np.empty((channels, 2, nodes))
@@ -194,20 +209,18 @@ class _Linearised:
             laws.polynomial, laws.steps, laws.step_owner, laws.line, self.spans, self.path, self.law, self.base,
         )  # fmt: skip
         self._own.evaluate(self.path, self.law)
-        self._dynamic, self.neglected, self._unbalanced, self.coupled = states_needed(
-            self.spans, self._forces, self.law, self.base, self.active, self._held, self._moved, _NEGLECTED
+        self._tolerable, self._unbalanced, self.coupled = tolerated(
+            self.spans, self._forces, self.law, self.base, self.active, self._held, _NEGLECTED
         )
-        self._contacts()
 
     def _divided(self, panels: Array, start: np.ndarray) -> tuple[Array, np.ndarray]:
         """Panels as short as the structure needs, and which of them events begin with."""
-        blocks = self._blocks
+        level = self._level
         finer: Array
         begins: np.ndarray
         finer, begins = divided(
-            panels, start, self.spans, self.law, self.loose, self.active, blocks.rates, blocks.decays,
-            blocks.flexibility, blocks.stiffening[self._dynamic], self._dynamic, self.neglected,
-            self._kinked, _LENGTHS,
+            panels, start, self.spans, self.law, self.loose, self.active, level.rates, level.decays,
+            level.flexibility, level.stiffening, self._choice.moved, self._kinked, _LENGTHS,
         )  # fmt: skip
         return finer, begins
 
@@ -218,16 +231,15 @@ class _Linearised:
         held, self._stretch = stretches(self.base, self.active)
         self._sequence, self.loose = tuple(map(tuple, held.tolist())), np.zeros_like(self.base)
         for r, stiffness in enumerate(self._sequence):
-            if form_of(*self._structure, self._dynamic, stiffness) is None:
+            if form_of(self._level, stiffness) is None:
                 self.loose[:, self._stretch == r] = self.base[:, self._stretch == r]
 
     def _march(self, law: Array, kick: Array, columns: int) -> Array:
         """States at the end of the period, (S, columns); see `propagate.march`."""
-        blocks = self._blocks
-        total = np.zeros((blocks.first[self._dynamic], columns))
+        total = np.zeros((self._level.states, columns))
         march(
             self._structures, self._stretch, self._forms, law, self.loose, kick, self.active, total, self._kept,
-            self._acting, self._solved, self._states,
+            self._acting, self._solved, self._begins,
         )  # fmt: skip
         return total
 
@@ -245,8 +257,8 @@ class _Linearised:
         return law, kick
 
     @lazy
-    def standing(self) -> ComplexArray:
-        """Multipliers along the motion as it stands, (size,)."""
+    def _all_standing(self) -> ComplexArray:
+        """Multipliers along the motion as it stands, (size,), also of what stands in for fast blocks."""
         real, imaginary, *_ = lapack.dgeev(self.before, 0, 0)
         return real + 1j * imaginary
 
@@ -260,10 +272,10 @@ class _Linearised:
         how far these may move them.
         """
         blocks = self._blocks
-        if self.size == len(blocks.exponents):
+        if self.own == len(blocks.exponents):
             return _NO_MULTIPLIERS
         without = np.ones(len(blocks.exponents), dtype=bool)
-        without[self._kept] = False
+        without[self._kept[: self.own]] = False
         means = self.state.tangent_spectra[:, blocks.active, 0].real
         exponents = blocks.exponents + blocks.shifting[0] @ means[0] + blocks.shifting[1] @ means[1]
         exponents = exponents[without] * (2.0 * math.pi / self.state.rate)
@@ -298,7 +310,7 @@ class _Linearised:
             elif weight < 1.0:
                 start = start - (1.0 - weight) * (projector(self.before) @ start)
             excess = response(
-                self._structures, self._stretch, self._forms, self.active, self._acting, self._solved, self._states,
+                self._structures, self._stretch, self._forms, self.active, self._acting, self._solved, self._begins,
                 start, self._whole, self._kept, self.path, _LARGEST, change,
             )  # fmt: skip
             if excess > 1.0:
@@ -309,8 +321,13 @@ class _Linearised:
         mu, shift = np.empty(self.size, dtype=complex), np.empty((2, self.size))
         real, imaginary, left, right, _ = lapack.dgeev(after, 1, 1)
         multipliers_and_shifts(
-            real, imaginary, left, right, after, self.before, self.neglected, self._doubt(change, share), mu, shift
-        )
+            real, imaginary, left, right, after, self.before, self.own, self.missing, self._doubt(change, share), mu,
+            shift,
+        )  # fmt: skip
+        self.standing = self._all_standing
+        for strange in mu[self.own :]:
+            self.standing = np.delete(self.standing, np.abs(self.standing - strange).argmin())
+        mu, shift = mu[: self.own], shift[:, : self.own]
         # where multipliers meet on their way the first order tells too little: each has at least come from the nearest
         np.maximum(shift[0], np.abs(mu[:, None] - self.standing).min(axis=1), out=shift[0])
         return mu, shift, share
@@ -337,9 +354,10 @@ class _Linearised:
         return 1.0 / worst
 
     def _doubt(self, change: Array, share: float) -> float:
-        """Share of a correction that blocks without states make, as springs, of forces that turn faster than these."""
+        """Share of a correction that is wrong by what the level leaves out, of forces beyond the harmonics."""
         size = float(np.abs(change[:, 0]).max(initial=0.0))
-        alone = share * self._unbalanced * float(np.abs(self._blocks.flexible[self._dynamic]).max(initial=0.0))
+        missing = self._level.left_out
+        alone = share * self._unbalanced * (0.0 if missing is None else beyond(missing, self._beyond))
         return min(1.0, alone / size) if size > 0.0 else 0.0
 
 
@@ -369,7 +387,7 @@ def _of_equation(state: BalanceState) -> FloquetResult:
     mu, errors = motion.others()
     if not np.isfinite(motion.before).all():
         return _no_numbers(state, motion.size + len(mu))
-    if motion.size:
+    if motion.own:
         own, own_errors = _with_states(motion)
         if not len(mu):
             return FloquetResult(own, own_errors)

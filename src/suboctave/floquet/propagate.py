@@ -13,7 +13,7 @@ nodes, and between the nodes the blocks move as they do:
 P_l Lagrange's polynomials. Panels are as long as polynomials follow the forces, whatever the blocks do. `structure`
 (`exponentials`) has these matrices, the same on all panels of one length. `march` then solves for the forces of the
 channels that act on a panel, a system as large as these have nodes; where none acts the blocks just go on. Constant
-stiffnesses of contacts are within the blocks (`blocks.Form`): as contacts begin and end, the states of one form become
+stiffnesses of contacts are within the blocks (`forms`): as contacts begin and end, the states of one form become
 those of the next. With forces as polynomials the method is of order 12 at a panel's end, as Lobatto IIIA is (Hairer &
 Wanner, Solving Ordinary Differential Equations II, section IV.5), and exact without.
 """
@@ -307,11 +307,51 @@ def closed(whole, kept, phi, start):
 
 
 @kernel(fastmath=_FAST, error_model="numpy")
-def multipliers_and_shifts(real, imaginary, left, right, phi, before, neglected, doubt, mu, moved):
-    """Eigenvalues of phi (N, N) by descending modulus into `mu` (N,), and how far each may have moved from those of
-    `before`, and by rounding of the entries, and by a matrix of the size `neglected`, relative to the largest, and a
-    share `doubt` of what differs from `before`, into `moved` (2, N).
+def own_values(imaginary, left, right, own):
+    """Which eigenvalues are those of the first `own` states, (N,): all others but those in whose eigenvectors, left
+    times right, the other states have most part.
 
+    imaginary (N,), left, right (N, N): as LAPACK's geev has them, conjugate vectors as real and imaginary parts.
+    """
+    size = imaginary.shape[0]
+    result, part = np.ones(size, dtype=np.bool_), np.zeros(size)
+    for j in range(size if own < size else 0):
+        if imaginary[j] < 0.0:
+            part[j] = part[j - 1]
+            continue
+        more, turn = (j + 1, 1.0) if imaginary[j] > 0.0 else (j, 0.0)
+        others = scale = 0.0j
+        for i in range(size):
+            u, v = complex(left[i, j], -turn * left[i, more]), complex(right[i, j], turn * right[i, more])
+            scale += u * v
+            if i >= own:
+                others += u * v
+        part[j] = abs(others) / max(abs(scale), _TINY)
+    left_over = size - own
+    while left_over > 0:
+        most = -1
+        for j in range(size):
+            wide = 1 if imaginary[j] == 0.0 else 2
+            if result[j] and wide <= left_over and (most < 0 or part[j] > part[most]):
+                most = j
+        if most < 0:
+            break
+        result[most] = False
+        left_over -= 1
+        if imaginary[most] != 0.0:
+            result[most + 1] = False
+            left_over -= 1
+    return result
+
+
+@kernel(fastmath=_FAST, error_model="numpy")
+def multipliers_and_shifts(real, imaginary, left, right, phi, before, own, missing, doubt, mu, moved):
+    """Eigenvalues of phi (N, N) by descending modulus into `mu` (N,), and how far each may have moved from those of
+    `before`, and by rounding of the entries, and by what is left out of the structure, and a share `doubt` of what
+    differs from `before`, into `moved` (2, N); those of other states than the first `own` come last.
+
+    missing (2, own): what is left out moves every eigenvalue by the product of the lengths of its vectors, left and
+    right, in these units.
     real, imaginary (N,), left, right (N, N): as LAPACK's geev has them, conjugate vectors as real and imaginary parts.
     """
     size = phi.shape[0]
@@ -324,8 +364,7 @@ def multipliers_and_shifts(real, imaginary, left, right, phi, before, neglected,
             norm += phi[i, j] ** 2
     # a double multiplier moves like the square root of a perturbation: that bounds the first-order estimate
     most = math.sqrt((math.sqrt(change) + _ROUNDING * math.sqrt(norm)) * largest)
-    unknown = neglected * largest + doubt * math.sqrt(change)
-    furthest = math.sqrt(unknown * largest)
+    unknown = doubt * math.sqrt(change)
     v, turned, length = np.empty(size), np.zeros(size), np.empty(size)
     for j in range(size):
         if imaginary[j] < 0.0:
@@ -351,8 +390,23 @@ def multipliers_and_shifts(real, imaginary, left, right, phi, before, neglected,
             by_rounding += abs(u) * rounded
         first = (abs(by_change) + _ROUNDING * by_rounding) / abs(scale) if abs(scale) > 0.0 else np.inf
         moved[0, j] = min(first, most) + 1e-14
-        moved[1, j] = min(unknown / abs(scale), furthest) if abs(scale) > 0.0 else furthest
-    for k in range(1, size):
+        ahead = behind = 0.0
+        for i in range(own):
+            ahead += (abs(complex(left[i, j], turn * left[i, more])) * missing[0, i]) ** 2
+            behind += (length[i] * missing[1, i]) ** 2
+        by_missing = unknown + abs(mu[j]) * math.sqrt(ahead * behind)
+        furthest = math.sqrt(by_missing * largest)
+        moved[1, j] = min(by_missing / abs(scale), furthest) if abs(scale) > 0.0 else furthest
+    count, kept = 0, own_values(imaginary, left, right, own)
+    for j in range(size):
+        if kept[j]:
+            # others move to the end
+            for i in range(j, count, -1):
+                mu[i], mu[i - 1] = mu[i - 1], mu[i]
+                for part in range(2):
+                    moved[part, i], moved[part, i - 1] = moved[part, i - 1], moved[part, i]
+            count += 1
+    for k in range(1, count):
         while k > 0 and abs(mu[k - 1]) < abs(mu[k]):
             mu[k - 1], mu[k] = mu[k], mu[k - 1]
             for part in range(2):

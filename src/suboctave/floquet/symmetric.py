@@ -28,7 +28,7 @@ from suboctave.harmonic.basis import Array, ComplexArray
 
 #: sum of the logarithms of all multipliers, `-int trace(M^-1 (C + f_v)) dt`, below which a motion counts as undamped
 UNDAMPED = 1e-9
-#: relative difference up to which multipliers are equal: of two that meet rounding leaves 1e-8
+#: relative difference below which multipliers are equal: of two that meet rounding leaves 1e-8
 EQUAL = 1e-7
 #: squares of products beyond which a factor is one to rounding
 _LARGE = 1e280
@@ -39,10 +39,11 @@ _INSIDE = 0.25
 def distinct(mu: ComplexArray) -> ComplexArray:
     """Multipliers without those that equal another one: a symmetric system has families of equal ones all along a
     branch, of which one stands for all. Where two such families are each other's inverses torus has a multiple zero.
+    Those that have decayed to nothing are no family.
     """
     if len(mu) < 2:
         return mu
-    alike = np.abs(mu[:, None] - mu[None, :]) <= EQUAL * np.abs(mu)[:, None]
+    alike = np.abs(mu[:, None] - mu[None, :]) < EQUAL * np.abs(mu)[:, None]
     return mu[~np.tril(alike, -1).any(axis=1)]
 
 

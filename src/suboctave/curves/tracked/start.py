@@ -36,6 +36,8 @@ Ranges = Mapping[str, tuple[float, float]]
 #: a start moves at most this far from the located point, or the motion given, in units of the parameters' spans and of
 #: the motion
 _NEAR, _BESIDE = 0.05, 0.5
+#: forces up to which a motion is one at rest, in any units: Newton's method comes to rest through ever smaller ones
+_NOTHING = 1e-100
 
 
 def inside(values: Mapping[str, float], ranges: Ranges) -> bool:
@@ -117,7 +119,7 @@ def curve_through(
         0.0 if adaptive is None else math.sqrt(adaptive.tolerance * adaptive.event_tolerance),
         augmentation,
         # nothing but a motion of unit size measures one at rest
-        reference=0.0 if force > 0.0 else 1.0,
+        reference=0.0 if force > _NOTHING else 1.0,
         unbounded=frozenset(names) - widths.keys(),
     )
     curve.force = max(force, curve.least_force(state))

@@ -1,0 +1,424 @@
+"""How far what is left out of a structure moves the multipliers of a motion.
+
+A level (`levels`) leaves out `D = H - H_e - R`, H of all fast blocks, H_e of what stands in for them, R a spring. That
+moves the exponent s of a slow motion. It makes forces at `s + i n omega` by the Fourier coefficients k_n of the
+stiffness and c_n of the damping, so that to first order s moves by
+
+    sum_n l (k_-n D(s_n) + c_-n D'(s_n)) (k_n r + c_n r'),    s_n = s + i n omega,
+
+l and r what drives the motion and what channels read of it, r' and D' of rates. D is tabulated in sizes, averaged over
+some of the frequency; at resonance two motions repel each other, and move by no more than what couples them. Behind the
+last coefficient that is known those of a stiffness that jumps follow.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from suboctave.compiled import kernel
+from suboctave.floquet.blocks import Blocks
+from suboctave.harmonic.basis import Array, ComplexArray
+
+#: sums may be reordered; infinities keep their meaning
+_FAST = {"reassoc", "contract", "nsz"}
+_TINY = float(np.finfo(float).tiny)
+#: multipliers up to this count as zero: that of a block may be wrong
+_GONE = 1e-6
+#: Fourier coefficients of stiffness and damping, relative to the largest, that couple nothing
+_SILENT = 1e-8
+#: how many frequencies of a table there are up to the slowest block left out, how many times this they reach, and the
+#: ratio of those beyond, up to so many times the fastest
+_PARTS, _REACH, _RATIO, _ABOVE = 8, 6, 1.25, 4.0
+#: how much farther than a motion of one block those may be moved that stiffness and damping make of several, and how
+#: much farther than others multipliers may that have decayed
+_OTHERS, _FREER = 2.0, 30.0
+#: over which share of a frequency D is averaged
+_AVERAGED = 0.1
+
+
+class Poles(NamedTuple):
+    """Blocks, see `blocks.Blocks`: (B, 2, 2), (B + 1,), (S, G), (2, G, S), (S,)."""
+
+    motion: Array
+    first: np.ndarray
+    driven: Array
+    read: Array
+    exponents: ComplexArray
+
+
+def poles(blocks: Blocks) -> Poles:
+    """Of the blocks what is wanted here."""
+    return Poles(blocks.motion, blocks.first, blocks.driven, blocks.read, blocks.exponents)
+
+
+class LeftOut(NamedTuple):
+    """What a level leaves out.
+
+    slow
+        How many blocks it does not leave out.
+    turns, decays, speeds
+        Largest imaginary and real parts and moduli of the eigenvalues of those that it does, and of those that stand in
+        for them, (B,).
+    couples
+        How far forces drive each of these, and how much channels read of it and of its rate, (B, 3, G).
+    unit
+        Distance of the frequencies Omega at which D is tabulated, from 0 on.
+    own, sizes, rates
+        The diagonal of D there, (nodes, G), |D| without it, and |D'|, (nodes, G, G).
+    tails
+        Sizes of the integrals from there on of `Re D d Omega / Omega^2`, `2 Im D d Omega / Omega^3`, and with |D'| as
+        the first, (3, nodes, G, G).
+    most
+        The largest entry of |D| from there on, (nodes,).
+    """
+
+    slow: int
+    turns: Array
+    decays: Array
+    speeds: Array
+    couples: Array
+    unit: float
+    own: ComplexArray
+    sizes: Array
+    rates: Array
+    tails: Array
+    most: Array
+
+
+def _turning(values: ComplexArray) -> Array:
+    result: Array = np.abs(values.imag)
+    return result
+
+
+def left_out(blocks: Blocks, slow: int, standing: Poles, flexible: Array) -> LeftOut:
+    """What is left out of those blocks that take part where only the first `slow` are followed, others stand in, and a
+    spring has no states.
+    """
+    at, states = slice(slow, blocks.coupled), slice(blocks.first[slow], blocks.first[blocks.coupled])
+    fast = Poles(
+        blocks.motion[at], blocks.first[slow : blocks.coupled + 1] - states.start, blocks.driven[states],
+        blocks.read[:, :, states], blocks.exponents[states],
+    )  # fmt: skip
+    without = Poles(
+        np.concatenate((fast.motion, standing.motion)),
+        np.concatenate((fast.first, standing.first[1:] + fast.first[-1])),
+        np.concatenate((fast.driven, standing.driven)),
+        np.concatenate((fast.read, standing.read), axis=2),
+        np.concatenate((fast.exponents, standing.exponents)),
+    )
+    nodes, count, unit = _PARTS * _REACH + 1, len(blocks.active), float(blocks.rates[slow]) / _PARTS
+    own, (sizes, rates) = np.zeros((nodes, count), dtype=complex), np.zeros((2, nodes, count, count))
+    tails, most = np.zeros((3, nodes, count, count)), np.zeros(nodes)
+    end = _ABOVE * float(blocks.rates[at].max())
+    _tabulate(without, len(fast.motion), flexible, unit, end, own, sizes, rates, tails, most)
+    of = [without.exponents[a:e] for a, e in pairwise(without.first.tolist())]
+    turns, decays, speeds = (np.array([f(values).max() for values in of]) for f in (_turning, np.real, np.abs))
+    couples = []
+    for a, e in pairwise(without.first.tolist()):
+        drives, reads = np.linalg.norm(without.driven[a:e], axis=0), np.linalg.norm(without.read[:, :, a:e], axis=2)
+        # of two conjugate states each has half
+        couples.append(np.stack((drives / (e - a), *reads)))
+    return LeftOut(slow, turns, decays, speeds, np.array(couples), unit, own, sizes, rates, tails, most)
+
+
+@kernel(fastmath=_FAST, error_model="numpy")
+def _transfer(blocks, b, s, sign, out):
+    """Add sign times H and H' of a block at s to out (2, G, G)."""
+    a, e = blocks.first[b], blocks.first[b + 1]
+    trace = determinant = 0.0j
+    m = blocks.motion[b]
+    if e - a == 1:
+        determinant = s - m[0, 0]
+    else:
+        trace = s - m[0, 0] - m[1, 1]
+        determinant = (s - blocks.exponents[a]) * (s - blocks.exponents[a + 1])
+    for h in range(out.shape[2]):
+        x = blocks.driven[a, h] + 0.0j
+        y = 0.0j
+        if e - a == 2:
+            z = blocks.driven[a + 1, h]
+            x, y = trace * x + m[0, 0] * x + m[0, 1] * z, trace * z + m[1, 0] * x + m[1, 1] * z
+        x, y = sign * x / determinant, sign * y / determinant
+        for part in range(2):
+            for g in range(out.shape[1]):
+                out[part, g, h] += blocks.read[part, g, a] * x
+                if e - a == 2:
+                    out[part, g, h] += blocks.read[part, g, a + 1] * y
+
+
+@kernel(fastmath=_FAST, error_model="numpy")
+def _missing_at(blocks, fast, flexible, w, out):
+    """D and D' at a frequency w into out (2, G, G)."""
+    for g in range(flexible.shape[0]):
+        for h in range(flexible.shape[0]):
+            out[0, g, h], out[1, g, h] = complex(-flexible[g, h], 0.0), 0.0j
+    for b in range(blocks.motion.shape[0]):
+        _transfer(blocks, b, complex(_AVERAGED * w, w), 1.0 if b < fast else -1.0, out)
+
+
+@kernel(fastmath=_FAST, error_model="numpy")
+def _tabulate(blocks, fast, flexible, unit, end, own, sizes, rates, tails, most):
+    """Fill the tables of `LeftOut`, of `fast` blocks that are left out and others that stand in for them."""
+    groups, nodes = flexible.shape[0], most.shape[0]
+    out, rest = np.empty((2, groups, groups), dtype=np.complex128), np.zeros((3, groups, groups))
+    largest, last = 0.0, (nodes - 1) * unit
+    steps = max(0, math.ceil(math.log(end / last) / math.log(_RATIO)))
+    for k in range(nodes - 1 + steps, -1, -1):
+        w = k * unit if k < nodes else last * _RATIO ** (k - nodes + 1)
+        _missing_at(blocks, fast, flexible, w, out)
+        # from there to the next, and from the last one on
+        upto = 0.0
+        if k < nodes - 1 + steps:
+            upto = w / ((k + 1) * unit) if k < nodes - 1 else 1.0 / _RATIO
+        for g in range(groups):
+            for h in range(groups):
+                if w > 0.0:
+                    rest[0, g, h] += out[0, g, h].real * (1.0 - upto) / w
+                    rest[1, g, h] += out[0, g, h].imag * (1.0 - upto * upto) / (w * w)
+                    rest[2, g, h] += abs(out[1, g, h]) * (1.0 - upto) / w
+                largest = max(largest, abs(out[0, g, h]))
+                if k < nodes:
+                    if g == h:
+                        own[k, g] = out[0, g, h]
+                    else:
+                        sizes[k, g, h] = abs(out[0, g, h])
+                    rates[k, g, h] = abs(out[1, g, h])
+                    for part in range(3):
+                        tails[part, k, g, h] = abs(rest[part, g, h])
+        if k < nodes:
+            most[k] = largest
+
+
+class Motions(NamedTuple):
+    """The slow motions of a structure's blocks, one of each, B of them, and what stiffness and damping make of them;
+    see `motions`.
+
+    exponents, left
+        Their exponents, and what of them a period leaves, (B,).
+    force, back
+        Sizes of the forces that a motion makes by the coefficients 0, 1, ..., (B, N, G), and of what drives it of
+        displacements and rates by these, (B, N, 2, G).
+    jumping, struck
+        `force` and `back` of a coefficient 1 if they go on as those of a jump do, (B, 1, G), (B, 1, 2, G).
+    damped, jumps
+        Whether there is any damping, and any jump.
+    """
+
+    exponents: ComplexArray
+    left: Array
+    force: Array
+    back: Array
+    jumping: Array
+    struck: Array
+    damped: bool
+    jumps: bool
+
+
+@kernel()
+def _jumps(tangents, active):
+    """n times the Fourier coefficients of stiffness and damping behind the last one that is known, if they go on as
+    those of a jump do, (2, G), and the last coefficient that counts; nothing jumps where that comes before the others.
+    """
+    top = tangents.shape[2] - 1
+    jumps, last = np.zeros((2, active.shape[0])), 0
+    for part in range(2):
+        for g in range(active.shape[0]):
+            largest = squares = 0.0
+            for n in range(top + 1):
+                largest = max(largest, abs(tangents[part, active[g], n]))
+            for n in range(top + 1):
+                size = abs(tangents[part, active[g], n])
+                if size > _SILENT * largest:
+                    last = max(last, n)
+                if 2 * n > top:
+                    squares += (n * size) ** 2 / (top - top // 2)
+            jumps[part, g] = math.sqrt(squares)
+    if 2 * last <= top:
+        jumps[:] = 0.0
+    return jumps, last
+
+
+@kernel(fastmath=_FAST, error_model="numpy")
+def _motion(blocks, i, rate, drives, reads):
+    """What drives a motion of block i, into drives (G,), and what channels read of it and of its rate, into reads (2,
+    G); returns its exponent.
+    """
+    a, e = blocks.first[i], blocks.first[i + 1]
+    value, m = blocks.exponents[a], blocks.motion[i]
+    v0, v1, w0, w1 = 1.0 + 0.0j, 0.0j, 1.0 + 0.0j, 0.0j
+    if e - a == 2:
+        other = blocks.exponents[a + 1]
+        apart = value - other
+        # two that are the same go apart by what moves them, but not within a period
+        if abs(apart) < rate / math.pi:
+            apart = complex(0.0, rate / math.pi)
+        p00, p01, p10, p11 = m[0, 0] - other, m[0, 1] + 0.0j, m[1, 0] + 0.0j, m[1, 1] - other
+        if abs(p01) > abs(p10):
+            v0, v1, w0, w1 = p01, p11, p00 / p01, 1.0 + 0.0j
+        elif abs(p10) > 0.0:
+            v0, v1, w0, w1 = p00, p10, 1.0 + 0.0j, p11 / p10
+        elif abs(p00) > abs(p11):
+            v0, v1, w0, w1 = p00, 0.0j, 1.0 + 0.0j, 0.0j
+        else:
+            v0, v1, w0, w1 = 0.0j, p11, 0.0j, 1.0 + 0.0j
+        v0, v1 = v0 / apart, v1 / apart
+    for g in range(drives.shape[0]):
+        drives[g] = w0 * blocks.driven[a, g]
+        for part in range(2):
+            reads[part, g] = v0 * blocks.read[part, g, a]
+        if e - a == 2:
+            drives[g] += w1 * blocks.driven[a + 1, g]
+            for part in range(2):
+                reads[part, g] += v1 * blocks.read[part, g, a + 1]
+    return value
+
+
+@kernel()
+def motions(tangents, active, rate, blocks, count):
+    """What stiffness and damping along a motion make of the slow motions of the first `count` blocks; see `Motions`.
+
+    tangents (2, C, top + 1): Fourier coefficients of stiffness and damping; active (G,): the channels that act; rate:
+    omega; blocks: see `Poles`.
+    """
+    groups, damped = active.shape[0], False
+    jumps, known = _jumps(tangents, active)
+    exponents, left = np.empty(count, dtype=np.complex128), np.empty(count)
+    force, back = np.empty((count, known + 1, groups)), np.empty((count, known + 1, 2, groups))
+    jumping, struck = np.empty((count, 1, groups)), np.empty((count, 1, 2, groups))
+    drives, reads = np.empty(groups, dtype=np.complex128), np.empty((2, groups), dtype=np.complex128)
+    for i in range(count):
+        exponents[i] = _motion(blocks, i, rate, drives, reads)
+        left[i] = math.exp(min(0.0, exponents[i].real) * 2.0 * math.pi / rate)
+        for g in range(groups):
+            drive, read, moving = abs(drives[g]), abs(reads[0, g]), abs(reads[1, g])
+            for n in range(known + 1):
+                stiff, damp = abs(tangents[0, active[g], n]), abs(tangents[1, active[g], n])
+                force[i, n, g], back[i, n, 0, g], back[i, n, 1, g] = (
+                    stiff * read + damp * moving,
+                    stiff * drive,
+                    damp * drive,
+                )
+                damped = damped or damp > 0.0
+            jumping[i, 0, g] = jumps[0, g] * read + jumps[1, g] * moving
+            struck[i, 0, 0, g], struck[i, 0, 1, g] = jumps[0, g] * drive, jumps[1, g] * drive
+    return Motions(exponents, left, force, back, jumping, struck, damped, jumps.sum() > 0.0)
+
+
+@kernel(fastmath=_FAST, error_model="numpy")
+def _coupled(couples, b, force, back, i, n):
+    """How much a block b, see `LeftOut`, couples the motion i with itself by the coefficient n, see `Motions`."""
+    driven = read = 0.0
+    for g in range(couples.shape[2]):
+        driven += couples[b, 0, g] * force[i, n, g]
+        read += couples[b, 1, g] * back[i, n, 0, g] + couples[b, 2, g] * back[i, n, 1, g]
+    return driven * read
+
+
+@kernel(fastmath=_FAST, error_model="numpy")
+def _repelled(known, i, missing, rate, last, waits):
+    """How far blocks that are left out move the motion i at resonance, by coefficients that are known, and by what
+    jumps leave of it until the next ones.
+    """
+    lines, nu, decay, total = known.force.shape[1], abs(known.exponents[i].imag), known.exponents[i].real, 0.0
+    for b in range(missing.turns.shape[0]):
+        turn, apart = missing.turns[b], missing.decays[b] - decay
+        for side in range(2):
+            at = (turn + nu if side else abs(turn - nu)) / rate
+            if at < lines:
+                n = int(at + 0.5)
+                away = abs(at - n) * rate
+                if n < lines and away < _AVERAGED * turn:
+                    coupled = _coupled(missing.couples, b, known.force, known.back, i, n)
+                    square = away * away + apart * apart
+                    if coupled > 0.0:
+                        nearer = math.sqrt(square) + coupled / math.sqrt(square + coupled)
+                        nearer *= coupled / (square + coupled)
+                        total += max(0.0, nearer - coupled / (_AVERAGED * turn))
+        size = missing.speeds[b]
+        coupled = _coupled(missing.couples, b, known.jumping, known.struck, i, 0) if size > last else 0.0
+        if coupled > 0.0:
+            width = math.sqrt(apart * apart + coupled * rate * rate / (size * size))
+            echoes = 1.0 / math.expm1(min(width * 2.0 * math.pi / rate, 50.0))
+            for time in waits:
+                echoes += math.exp(-width * time) / waits.shape[0]
+            total += 4.0 * math.pi * rate * coupled / (size * size) * echoes
+    return total
+
+
+@kernel(fastmath=_FAST, error_model="numpy")
+def _answered(missing, frequency, force, back, damped):
+    """What drives a motion, back (2, G), by what is left out of the answer to forces (G,) at a frequency: of channels'
+    own forces, and a bound of the rest.
+    """
+    own, rest, where = 0.0j, 0.0, min(abs(frequency) / missing.unit, missing.most.shape[0] - 1.0)
+    j = min(int(where), missing.most.shape[0] - 2)
+    low, high = j + 1.0 - where, where - j
+    for g in range(force.shape[0]):
+        own += back[0, g] * force[g] * (low * missing.own[j, g] + high * missing.own[j + 1, g])
+        by = moving = 0.0
+        for h in range(force.shape[0]):
+            by += (low * missing.sizes[j, g, h] + high * missing.sizes[j + 1, g, h]) * force[h]
+        for h in range(force.shape[0] if damped else 0):
+            moving += (low * missing.rates[j, g, h] + high * missing.rates[j + 1, g, h]) * force[h]
+        rest += back[0, g] * by + back[1, g] * moving
+    return own if frequency >= 0.0 else own.conjugate(), rest
+
+
+@kernel(fastmath=_FAST, error_model="numpy")
+def _by_jumps(missing, last, nu, force, back):
+    """The same by all coefficients behind the frequency `last`, as those of a jump, of a motion of the frequency nu."""
+    nodes, groups, total = missing.most.shape[0], force.shape[0], 0.0
+    where = min(last / missing.unit, nodes - 1.0)
+    j = min(int(where), nodes - 2)
+    low, high = j + 1.0 - where, where - j
+    for g in range(groups):
+        for h in range(groups):
+            tail = missing.tails[:, j, g, h]
+            next = missing.tails[:, j + 1, g, h]
+            by = low * (tail[0] + nu * tail[1]) + high * (next[0] + nu * next[1])
+            total += (back[0, g] * by + back[1, g] * (low * tail[2] + high * next[2])) * force[h]
+    return total
+
+
+@kernel(fastmath=_FAST, error_model="numpy")
+def moved_without(known, rate, last, waits, missing, most, shifts):
+    """How far what is left out moves multipliers, those that have decayed counting less, or more than `most`; how far
+    it moves the exponents of all slow motions within a period into shifts (B,).
+
+    known: see `Motions`; rate: omega; last: the frequency behind that of the last coefficient that is known; waits:
+    times between jumps; missing: see `LeftOut`.
+    """
+    worst = largest = 0.0
+    for i in range(missing.slow):
+        shifts[i] = largest
+        if not known.left[i] > _GONE:
+            continue
+        nu, own, shift = abs(known.exponents[i].imag), 0.0j, 0.0
+        for n in range(known.force.shape[1]):
+            acts = False
+            for g in range(known.force.shape[2]):
+                acts = acts or known.force[i, n, g] != 0.0
+            for side in range((2 if n > 0 else 1) if acts else 0):
+                at = nu + n * rate if side else nu - n * rate
+                answer, rest = _answered(missing, at, known.force[i, n], known.back[i, n], known.damped)
+                own += answer
+                shift += rest
+        shift += _repelled(known, i, missing, rate, last, waits) + abs(own)
+        if known.jumps:
+            shift += 2.0 * rate * _by_jumps(missing, last, nu, known.jumping[i, 0], known.struck[i, 0])
+        shifts[i] = _OTHERS * shift * 2.0 * math.pi / rate
+        largest = max(largest, shifts[i])
+        far = 1.0 + _FREER * (1.0 - known.left[i])
+        worst = max(worst, known.left[i] * math.expm1(min(shifts[i], 1.0)) / far)
+        if worst > most:
+            break
+    return worst
+
+
+def beyond(missing: LeftOut, frequency: float) -> float:
+    """The largest entry of D from a frequency on."""
+    return float(missing.most[min(int(frequency / missing.unit), len(missing.most) - 1)])

@@ -1,0 +1,259 @@
+"""How few states serve: the slow blocks of a structure as they are, and all faster ones together as few others.
+
+Blocks that are too fast for a motion (`blocks`) need not be followed one by one. What they are to the forces is their
+flexibility `H(s) = G (s - L)^-1 B`, and for forces slower than they are its first derivatives at rest tell nearly all
+of it. A substitute with the matrices
+
+    L_e = (W^T V)^-1 W^T L V,   B_e = (W^T V)^-1 W^T B,   G_e = G V,
+    V = [L^-1 B, ..., L^-2p B],   W^T = [G L^-1; ...; G L^-2p],
+
+has 2 p states for every channel, and its H and 4 p - 1 derivatives of that are those of all fast blocks (two-sided
+Lanczos: Bai, Applied Numerical Mathematics 43 (2002) 9-44). Its eigenvectors make blocks of it. Of the order 0 it is a
+spring, `q = R F` with the flexibility at rest, without states. A `Level` is one such choice; `left_out` tells what it
+costs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from suboctave.floquet.blocks import Blocks, in_blocks, separated
+from suboctave.floquet.left_out import LeftOut, Motions, Poles, left_out, moved_without
+from suboctave.harmonic.aft.channel import Group
+from suboctave.harmonic.basis import Array
+from suboctave.harmonic.linear_part import LinearPart
+
+#: about how many numbers of blocks are tried: what belongs to each of them serves other motions as well
+_CUTS = 12
+#: orders of substitutes, those first that are most often the least work
+_ORDERS = (1, 2, 0)
+#: condition of a substitute's states beyond which it is none
+_PARALLEL = 1e6
+#: part of a direction that others do not hold, relative, below which it depends on them
+_DEPENDENT = 1e-6
+#: how much slower than the slowest block that it stands for a substitute may be
+_SLOWER = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """What has states: B blocks with S states, G channels. See `blocks.Blocks` for what is not said here.
+
+    slow, own
+        How many blocks are the structure's own, the first ones, and how many states these have; others are a
+        substitute.
+    motion, first, driven, read, coupling, rates, decays, flexibility
+        (B, 2, 2), (B + 1,), (S, G), (2, G, S), (B, 2, 2 G G), (B,), (B,), (B, G, G).
+    stiffening
+        How much an impulse of stiffness in a channel adds to squared rates, (G,).
+    flexible
+        R of what has no states, (G, G).
+    left_out
+        What it leaves out; None where that is nothing.
+    states, steepest, work
+        S, the least of the decays, and how much it takes to follow the states, to be compared: what a panel takes, and
+        how many of these there are in a time.
+    sizes
+        Roots of how far a force in a channel drives the structure's own blocks in units of how much channels read of
+        them, and the inverse, (2, own).
+    """
+
+    slow: int
+    own: int
+    motion: Array
+    first: np.ndarray
+    driven: Array
+    read: Array
+    coupling: Array
+    rates: Array
+    decays: Array
+    flexibility: Array
+    stiffening: Array
+    flexible: Array
+    left_out: LeftOut | None
+    states: int
+    steepest: float
+    work: float
+    sizes: Array
+
+
+class Along(NamedTuple):
+    """A motion as levels are chosen by it: see `left_out.moved_without`."""
+
+    known: Motions
+    rate: float
+    last: float
+    waits: Array
+
+
+class Choice(NamedTuple):
+    """A level, how far what it leaves out moves multipliers, and the exponents of its own blocks within a period, (B,);
+    see `left_out.moved_without`.
+    """
+
+    level: Level
+    moved: float
+    shifts: Array
+
+
+class Levels:
+    """The levels of a structure, made when they are asked for."""
+
+    def __init__(self, blocks: Blocks) -> None:
+        self.blocks = blocks
+        self.whole = Choice(_level(blocks, blocks.coupled, None, 0.0), 0.0, np.zeros(blocks.coupled))
+        self._cuts = list(range(0, blocks.coupled, max(1, blocks.coupled // _CUTS)))
+        self._made: dict[tuple[int, int], Level | None] = {}
+
+    def of(self, slow: int, order: int) -> Level | None:
+        """The first `slow` blocks of those that take part, with a substitute of an order for all others; None where
+        there is none that has fewer states.
+        """
+        at = slow, order
+        if at not in self._made:
+            self._made[at] = self._make(slow, order)
+        return self._made[at]
+
+    def _make(self, slow: int, order: int) -> Level | None:
+        blocks = self.blocks
+        if np.abs(blocks.exponents[blocks.first[slow] : blocks.first[blocks.coupled]]).min() == 0.0:
+            return None  # what is free to move is no spring
+        if order == 0:
+            return _level(blocks, slow, None, blocks.flexibility[slow : blocks.coupled].sum(axis=0))
+        few = _substitute(blocks, slow, order)
+        return None if few is None else _level(blocks, slow, few, 0.0)
+
+    def least_work(self, along: Along, resolved: float, tolerable: float) -> Choice:
+        """The level that is least work of those without which multipliers move no farther than is tolerable; all blocks
+        with rates up to `resolved` have states.
+        """
+        least = self.whole
+        cuts = [slow for slow in self._cuts if self.blocks.rates[slow] > resolved]
+        for order in _ORDERS if cuts else ():
+            levels = [level for slow in cuts if (level := self.of(slow, order)) and level.work < least.level.work]
+            # the more slow blocks there are, the less is left out
+            low, high = 0, len(levels)
+            while low < high:
+                middle = (low + high) // 2
+                level, shifts = levels[middle], np.empty(levels[middle].slow)
+                assert level.left_out is not None
+                moved = moved_without(*along, level.left_out, tolerable, shifts)
+                if moved <= tolerable:
+                    high, least = middle, Choice(level, moved, shifts)
+                else:
+                    low = middle + 1
+        return least
+
+
+@lru_cache(maxsize=16)
+def levels_of(linear: LinearPart, groups: tuple[Group, ...]) -> Levels:
+    """The levels of the linear part with the channels of groups."""
+    return Levels(in_blocks(linear, groups))
+
+
+class _Few(NamedTuple):
+    """Blocks of a substitute: matrices, B and G with G'."""
+
+    matrices: list[Array]
+    driven: Array
+    read: Array
+
+
+def _substitute(blocks: Blocks, slow: int, order: int) -> _Few | None:
+    """That of the blocks from `slow` on; None where these have no more states than it, or it would be no damped motion
+    as fast as they are.
+    """
+    first, last, count = blocks.first[slow], blocks.first[blocks.coupled], len(blocks.active)
+    size = int(last - first)
+    if size <= 2 * order * count:
+        return None
+    whole, inverse = np.zeros((size, size)), np.zeros((size, size))
+    for b in range(slow, blocks.coupled):
+        s, e = blocks.first[b] - first, blocks.first[b + 1] - first
+        whole[s:e, s:e] = blocks.motion[b, : e - s, : e - s]
+        inverse[s:e, s:e] = np.linalg.inv(whole[s:e, s:e])
+    driven, read = blocks.driven[first:last], blocks.read[:, :, first:last]
+    right = _spanned(inverse @ driven, inverse, 2 * order)
+    left = _spanned(inverse.T @ read[0].T, inverse.T, 2 * order)
+    if right.shape[1] != left.shape[1]:
+        return None
+    between = left.T @ right
+    if not np.linalg.cond(between) < _PARALLEL:
+        return None
+    onto = np.linalg.solve(between, left.T)
+    try:
+        basis, back, matrices = separated(onto @ whole @ right)
+    except np.linalg.LinAlgError:  # two of its eigenvectors are the same
+        return None
+    values = [np.linalg.eigvals(matrix) for matrix in matrices]
+    slowest, steepest = min(np.abs(v).min() for v in values), max(v.real.max() for v in values)
+    damped = steepest <= max(0.0, float(blocks.decays[slow : blocks.coupled].max()))
+    if not (np.linalg.cond(basis) < _PARALLEL and damped and slowest >= blocks.rates[slow] * (1.0 - _SLOWER)):
+        return None
+    return _Few(matrices, back @ onto @ driven, read @ right @ basis)
+
+
+def _spanned(vectors: Array, inverse: Array, powers: int) -> Array:
+    """An orthonormal basis of some vectors, columns, and of what powers of the inverse make of them, so many in all."""
+    basis = np.zeros((len(vectors), 0))
+    for _ in range(powers):
+        for _ in range(2):
+            vectors = vectors - basis @ (basis.T @ vectors)
+        length = np.linalg.norm(vectors, axis=0)
+        u, sizes, _ = np.linalg.svd(vectors / np.where(length > 0.0, length, 1.0), full_matrices=False)
+        new = u[:, sizes > _DEPENDENT * sizes.max(initial=0.0)]
+        basis, vectors = np.concatenate((basis, new), axis=1), inverse @ new
+    return basis
+
+
+def _sizes(blocks: Blocks, slow: int) -> Array:
+    """See `Level.sizes`."""
+    ends, own = blocks.first[: slow + 1], int(blocks.first[slow])
+    drives, reads = (blocks.driven[:own] ** 2).sum(axis=1), (blocks.read[0, :, :own] ** 2).sum(axis=0)
+    ratio = (np.add.reduceat(drives, ends[:-1]) / np.add.reduceat(reads, ends[:-1])) ** 0.25 if slow else np.zeros(0)
+    ratio = np.repeat(ratio, np.diff(ends))
+    return np.stack((ratio, 1.0 / ratio))
+
+
+def _level(blocks: Blocks, slow: int, few: _Few | None, flexible: Array | float) -> Level:
+    """The first `slow` blocks, with a substitute and a spring for the others."""
+    own, count = int(blocks.first[slow]), len(blocks.active)
+    motion, ends = list(blocks.motion[:slow]), blocks.first[: slow + 1].tolist()
+    coupling, flexibility = list(blocks.coupling[:slow]), list(blocks.flexibility[:slow])
+    driven, read, exponents = blocks.driven[:own], blocks.read[:, :, :own], list(blocks.exponents[:own])
+    added, flexible = np.zeros(count), np.zeros((count, count)) + flexible
+    if few is not None:
+        at = 0
+        for matrix in few.matrices:
+            e = at + len(matrix)
+            drives, g = few.driven[at:e], few.read[:, :, at:e]
+            motion.append(np.zeros((2, 2)))
+            motion[-1][: e - at, : e - at] = matrix
+            coupling.append(np.stack(((g @ drives).ravel(), (g @ matrix @ drives).ravel())))
+            flexibility.append(-g[0] @ np.linalg.solve(matrix, drives))
+            exponents += np.linalg.eigvals(matrix).tolist()
+            added += np.linalg.norm(drives, axis=0) * np.linalg.norm(g[1], axis=1)
+            at = e
+            ends.append(own + at)
+        driven, read = np.concatenate((driven, few.driven)), np.concatenate((read, few.read), axis=2)
+    of = [np.array(exponents[s:e]) for s, e in pairwise(ends)]
+    whole, first = np.array(motion).reshape(len(motion), 2, 2), np.array(ends, dtype=np.int64)
+    driven, read = np.ascontiguousarray(driven), np.ascontiguousarray(read)
+    missing = None
+    if slow < blocks.coupled:
+        standing = Poles(
+            whole[slow:], first[slow:] - own, driven[own:], read[:, :, own:], np.array(exponents[own:], complex)
+        )
+        missing = left_out(blocks, slow, standing, flexible)
+    b, rates, decays = len(motion), *(np.array([part(values).max() for values in of]) for part in (np.abs, np.real))
+    return Level(
+        slow, own, whole, first, driven, read, np.array(coupling).reshape(b, 2, 2 * count * count), rates, decays,
+        np.array(flexibility).reshape(b, count, count), blocks.stiffening[slow] + added, flexible, missing,
+        int(first[-1]), float(decays.min(initial=0.0)),
+        float(first[-1] ** 2 * rates.max(initial=0.0)), _sizes(blocks, slow),
+    )  # fmt: skip
