@@ -53,6 +53,8 @@ class Blocks(NamedTuple):
         G and G', (2, G, S).
     flexibility
         -G L^-1 B of every block, (B, G, G); of one that is free to move, or does not take part, zero.
+    yielding
+        Sizes of its entries, summed over the channels that drive, (B, G).
     coupling
         G B and G L B of every block, (B, 2, 2 G G), by q and q', channels that read and that drive.
     stiffening
@@ -75,6 +77,7 @@ class Blocks(NamedTuple):
     driven: Array
     read: Array
     flexibility: Array
+    yielding: Array
     coupling: Array
     stiffening: Array
     shifting: ComplexArray
@@ -236,6 +239,7 @@ def _arranged(parts: _Parts, n: int, left: Array, right: Array, active: np.ndarr
     exponents = np.concatenate([parts.exponents[i] for i in order])
     return Blocks(
         motion, first, rates[order], decays, exponents, into, np.ascontiguousarray(out), flexibility,
+        np.abs(flexibility).sum(axis=2),
         coupling.reshape(len(order), 2, -1), stiffening, shifting, int(coupled.sum()), active, rounding,
     )  # fmt: skip
 

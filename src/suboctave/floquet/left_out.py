@@ -28,6 +28,8 @@ _FAST = {"reassoc", "contract", "nsz"}
 _TINY = float(np.finfo(float).tiny)
 #: multipliers up to this count as zero: that of a block may be wrong
 _GONE = 1e-6
+#: error of one that is nothing
+_NOTHING = 1e-14
 #: Fourier coefficients of stiffness and damping, relative to the largest, that couple nothing
 _SILENT = 1e-8
 #: how many frequencies of a table there are up to the slowest block left out, how many times this they reach, and the
@@ -72,8 +74,8 @@ class LeftOut(NamedTuple):
     tails
         Sizes of the integrals from there on of `Re D d Omega / Omega^2`, `2 Im D d Omega / Omega^3`, and with |D'| as
         the first, (3, nodes, G, G).
-    most
-        The largest entry of |D| from there on, (nodes,).
+    average
+        The largest entry of |D|, its mean from there on by `d Omega / Omega^2`, (nodes,).
     """
 
     slow: int
@@ -86,7 +88,7 @@ class LeftOut(NamedTuple):
     sizes: Array
     rates: Array
     tails: Array
-    most: Array
+    average: Array
 
 
 def _turning(values: ComplexArray) -> Array:
@@ -112,9 +114,9 @@ def left_out(blocks: Blocks, slow: int, standing: Poles, flexible: Array) -> Lef
     )
     nodes, count, unit = _PARTS * _REACH + 1, len(blocks.active), float(blocks.rates[slow]) / _PARTS
     own, (sizes, rates) = np.zeros((nodes, count), dtype=complex), np.zeros((2, nodes, count, count))
-    tails, most = np.zeros((3, nodes, count, count)), np.zeros(nodes)
+    tails, average = np.zeros((3, nodes, count, count)), np.zeros(nodes)
     end = _ABOVE * float(blocks.rates[at].max())
-    _tabulate(without, len(fast.motion), flexible, unit, end, own, sizes, rates, tails, most)
+    _tabulate(without, len(fast.motion), flexible, unit, end, own, sizes, rates, tails, average)
     of = [without.exponents[a:e] for a, e in pairwise(without.first.tolist())]
     turns, decays, speeds = (np.array([f(values).max() for values in of]) for f in (_turning, np.real, np.abs))
     couples = []
@@ -122,7 +124,7 @@ def left_out(blocks: Blocks, slow: int, standing: Poles, flexible: Array) -> Lef
         drives, reads = np.linalg.norm(without.driven[a:e], axis=0), np.linalg.norm(without.read[:, :, a:e], axis=2)
         # of two conjugate states each has half
         couples.append(np.stack((drives / (e - a), *reads)))
-    return LeftOut(slow, turns, decays, speeds, np.array(couples), unit, own, sizes, rates, tails, most)
+    return LeftOut(slow, turns, decays, speeds, np.array(couples), unit, own, sizes, rates, tails, average)
 
 
 @kernel(fastmath=_FAST, error_model="numpy")
@@ -161,11 +163,11 @@ def _missing_at(blocks, fast, flexible, w, out):
 
 
 @kernel(fastmath=_FAST, error_model="numpy")
-def _tabulate(blocks, fast, flexible, unit, end, own, sizes, rates, tails, most):
+def _tabulate(blocks, fast, flexible, unit, end, own, sizes, rates, tails, average):
     """Fill the tables of `LeftOut`, of `fast` blocks that are left out and others that stand in for them."""
-    groups, nodes = flexible.shape[0], most.shape[0]
+    groups, nodes = flexible.shape[0], average.shape[0]
     out, rest = np.empty((2, groups, groups), dtype=np.complex128), np.zeros((3, groups, groups))
-    largest, last = 0.0, (nodes - 1) * unit
+    last, seldom = (nodes - 1) * unit, 0.0
     steps = max(0, math.ceil(math.log(end / last) / math.log(_RATIO)))
     for k in range(nodes - 1 + steps, -1, -1):
         w = k * unit if k < nodes else last * _RATIO ** (k - nodes + 1)
@@ -174,6 +176,7 @@ def _tabulate(blocks, fast, flexible, unit, end, own, sizes, rates, tails, most)
         upto = 0.0
         if k < nodes - 1 + steps:
             upto = w / ((k + 1) * unit) if k < nodes - 1 else 1.0 / _RATIO
+        largest = 0.0
         for g in range(groups):
             for h in range(groups):
                 if w > 0.0:
@@ -189,8 +192,9 @@ def _tabulate(blocks, fast, flexible, unit, end, own, sizes, rates, tails, most)
                     rates[k, g, h] = abs(out[1, g, h])
                     for part in range(3):
                         tails[part, k, g, h] = abs(rest[part, g, h])
+        seldom += largest * (1.0 - upto) / w if w > 0.0 else 0.0
         if k < nodes:
-            most[k] = largest
+            average[k] = w * seldom
 
 
 class Motions(NamedTuple):
@@ -354,8 +358,8 @@ def _answered(missing, frequency, force, back, damped):
     """What drives a motion, back (2, G), by what is left out of the answer to forces (G,) at a frequency: of channels'
     own forces, and a bound of the rest.
     """
-    own, rest, where = 0.0j, 0.0, min(abs(frequency) / missing.unit, missing.most.shape[0] - 1.0)
-    j = min(int(where), missing.most.shape[0] - 2)
+    own, rest, where = 0.0j, 0.0, min(abs(frequency) / missing.unit, missing.average.shape[0] - 1.0)
+    j = min(int(where), missing.average.shape[0] - 2)
     low, high = j + 1.0 - where, where - j
     for g in range(force.shape[0]):
         own += back[0, g] * force[g] * (low * missing.own[j, g] + high * missing.own[j + 1, g])
@@ -371,7 +375,7 @@ def _answered(missing, frequency, force, back, damped):
 @kernel(fastmath=_FAST, error_model="numpy")
 def _by_jumps(missing, last, nu, force, back):
     """The same by all coefficients behind the frequency `last`, as those of a jump, of a motion of the frequency nu."""
-    nodes, groups, total = missing.most.shape[0], force.shape[0], 0.0
+    nodes, groups, total = missing.average.shape[0], force.shape[0], 0.0
     where = min(last / missing.unit, nodes - 1.0)
     j = min(int(where), nodes - 2)
     low, high = j + 1.0 - where, where - j
@@ -419,6 +423,33 @@ def moved_without(known, rate, last, waits, missing, most, shifts):
     return worst
 
 
+@kernel()
+def of_the_rest(exponents, shifting, first, rates, yielding, means, held, without, rate, rounding):
+    """Multipliers of the blocks' states that are not followed, `without` (S,), as if channels had their mean stiffness
+    and damping, and how far these may move them.
+
+    exponents, shifting, first, rates, yielding: see `blocks.Blocks`; means, held (2, G): means, and integrals of the
+    sizes, of stiffness and damping; rate: omega; rounding: relative error by it.
+    """
+    mu, errors, count = np.empty(exponents.shape[0], dtype=np.complex128), np.empty(exponents.shape[0]), 0
+    for b in range(rates.shape[0]):
+        forces = 0.0
+        for g in range(held.shape[1]):
+            forces += yielding[b, g] * (held[0, g] + rates[b] * held[1, g])
+        moved = math.expm1(min(2.0 * rates[b] * forces, 1.0)) + rounding
+        for s in range(first[b], first[b + 1]):
+            if not without[s]:
+                continue
+            exponent = exponents[s]
+            for g in range(held.shape[1]):
+                exponent += shifting[0, s, g] * means[0, g] + shifting[1, s, g] * means[1, g]
+            exponent *= 2.0 * math.pi / rate
+            mu[count] = np.exp(exponent)
+            errors[count] = abs(mu[count]) * (moved + 1e-15 * abs(exponent)) + _NOTHING
+            count += 1
+    return mu[:count], errors[:count]
+
+
 def beyond(missing: LeftOut, frequency: float) -> float:
-    """The largest entry of D from a frequency on."""
-    return float(missing.most[min(int(frequency / missing.unit), len(missing.most) - 1)])
+    """The largest entry of D from a frequency on, in the mean of forces that fall as those of a stop do."""
+    return float(missing.average[min(int(frequency / missing.unit), len(missing.average) - 1)])

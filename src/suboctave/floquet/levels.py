@@ -109,6 +109,7 @@ class Levels:
         self.whole = Choice(_level(blocks, blocks.coupled, None, 0.0), 0.0, np.zeros(blocks.coupled))
         self._cuts = list(range(0, blocks.coupled, max(1, blocks.coupled // _CUTS)))
         self._made: dict[tuple[int, int], Level | None] = {}
+        self._from: dict[tuple[int, int], list[Level]] = {}
 
     def of(self, slow: int, order: int) -> Level | None:
         """The first `slow` blocks of those that take part, with a substitute of an order for all others; None where
@@ -128,14 +129,21 @@ class Levels:
         few = _substitute(blocks, slow, order)
         return None if few is None else _level(blocks, slow, few, 0.0)
 
+    def _beyond(self, slow: int, order: int) -> list[Level]:
+        """The levels of an order with at least so many slow blocks, fewest first."""
+        at = slow, order
+        if at not in self._from:
+            levels = [self.of(cut, order) for cut in self._cuts if cut >= slow]
+            self._from[at] = [level for level in levels if level is not None]
+        return self._from[at]
+
     def least_work(self, along: Along, resolved: float, tolerable: float) -> Choice:
         """The level that is least work of those without which multipliers move no farther than is tolerable; all blocks
         with rates up to `resolved` have states.
         """
-        least = self.whole
-        cuts = [slow for slow in self._cuts if self.blocks.rates[slow] > resolved]
-        for order in _ORDERS if cuts else ():
-            levels = [level for slow in cuts if (level := self.of(slow, order)) and level.work < least.level.work]
+        least, slow = self.whole, int(np.searchsorted(self.blocks.rates[: self.blocks.coupled], resolved, "right"))
+        for order in _ORDERS if slow < self.blocks.coupled else ():
+            levels = [level for level in self._beyond(slow, order) if level.work < least.level.work]
             # the more slow blocks there are, the less is left out
             low, high = 0, len(levels)
             while low < high:

@@ -50,7 +50,7 @@ from scipy.linalg import lapack
 from suboctave.floquet.channels import BLIND, Channels
 from suboctave.floquet.exponentials import TURNS, structure
 from suboctave.floquet.forms import form_of, forms_along
-from suboctave.floquet.left_out import beyond, motions, poles
+from suboctave.floquet.left_out import beyond, motions, of_the_rest, poles
 from suboctave.floquet.levels import Along, levels_of
 from suboctave.floquet.propagate import closed, march, multipliers_and_shifts, response
 from suboctave.floquet.resolution import ACCURACY, divided, longest_rest, stretches, tolerated
@@ -74,6 +74,8 @@ from suboctave.lazy import lazy
 #: how far what is left out of a structure may move multipliers, and how much further where a force is left unbalanced
 #: altogether, which does more
 _NEGLECTED = (1e-5, 3e-4)
+#: how many times the first order of that is stated
+_ASSURED = 2.0
 #: longest panels in units of the time scales of the forces, of the blocks as channels see them, and of the blocks; how
 #: much less these count if they are seen little, as a power: with them multipliers are good for 1e-8
 _LENGTHS = (1.2, 1.8, TURNS, 1.0 / 12.0)
@@ -188,7 +190,7 @@ class _Linearised:
         self.size = size = len(self._kept)
         self.own = int(np.searchsorted(self._kept, level.own))
         shifts = np.repeat(self._choice.shifts, np.diff(level.first[: level.slow + 1]))
-        self.missing = (np.sqrt(shifts) * level.sizes)[:, self._kept[: self.own]]
+        self.missing = (np.sqrt(_ASSURED * shifts) * level.sizes)[:, self._kept[: self.own]]
         self._forms, self._turned = forms_along(self._level, self._sequence)
         self._structures = structure(self.spans, self._stretch, self._forms)
         self._acting = np.empty((len(self.spans), channels), dtype=bool)
@@ -277,14 +279,10 @@ class _Linearised:
         without = np.ones(len(blocks.exponents), dtype=bool)
         without[self._kept[: self.own]] = False
         means = self.state.tangent_spectra[:, blocks.active, 0].real
-        exponents = blocks.exponents + blocks.shifting[0] @ means[0] + blocks.shifting[1] @ means[1]
-        exponents = exponents[without] * (2.0 * math.pi / self.state.rate)
-        mu, flexible = np.exp(exponents), np.abs(blocks.flexibility).sum(axis=2)
-        by_stiffness, by_damping = (flexible @ held for held in self._held)
-        by_forces = 2.0 * blocks.rates * (by_stiffness + blocks.rates * by_damping)
-        moved = np.repeat(np.expm1(np.minimum(by_forces, 1.0)), np.diff(blocks.first))[without]
-        moved += 1e-15 * np.abs(exponents) + self.rounding
-        return mu, np.abs(mu) * moved + math.exp(_FORGOTTEN)
+        return of_the_rest(
+            blocks.exponents, blocks.shifting, blocks.first, blocks.rates, blocks.yielding, means, self._held, without,
+            self.state.rate, self.rounding,
+        )  # fmt: skip
 
     def _still(self) -> Array:
         """Where the periodic response begins, (N, 1), with the least change of the phase: nothing along the singular
