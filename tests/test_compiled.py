@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import json
 import os
+import pickle
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -71,6 +72,56 @@ def test_what_an_earlier_process_has_compiled_is_loaded_without_a_word(made, cap
     assert total(VALUES) == 30.0
     assert sum(total.stats.cache_hits.values()) == 1
     assert not capsys.readouterr().err
+
+
+CALLED = """
+from suboctave.compiled import kernel
+
+@kernel()
+def inner(x):
+    return {power}
+"""
+CALLING = """
+from suboctave.compiled import kernel
+from suboctave_called_by_a_test import inner
+
+@kernel()
+def outer(x):
+    return inner(x) + 1.0
+"""
+
+
+def test_a_kernel_is_compiled_anew_when_another_file_that_it_calls_has_changed(tmp_path, monkeypatch):
+    monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.setattr(compiled, "KERNELS", [])
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "suboctave_calling_of_a_test.py").write_text(CALLING)
+    results = []
+    for power in ("x * x", "x * x * x", "x * x * x"):
+        (tmp_path / "suboctave_called_by_a_test.py").write_text(CALLED.format(power=power))
+        for name in ("suboctave_called_by_a_test", "suboctave_calling_of_a_test"):
+            sys.modules.pop(name, None)
+        importlib.invalidate_caches()
+        outer = importlib.import_module("suboctave_calling_of_a_test").outer
+        results.append(outer(2.0))
+    assert results == [5.0, 9.0, 9.0]
+    for name in ("suboctave_called_by_a_test", "suboctave_calling_of_a_test"):
+        sys.modules.pop(name, None)
+
+
+def test_what_another_version_has_left_in_the_cache_does_no_harm(made, tmp_path):
+    """Not even where it names a class that is no more."""
+    made()(VALUES)
+    written = list((tmp_path / "cache").rglob("*total*.nbi"))
+    assert written
+    for path in written:
+        with open(path, "rb") as file:
+            version = pickle.load(file)
+        with open(path, "wb") as file:
+            pickle.dump(version, file)
+            file.write(b"csuboctave.compiled\nNoSuchClass\n.")
+    assert made()(VALUES) == 30.0
+    assert made()(VALUES) == 30.0
 
 
 def test_without_a_folder_for_the_cache_kernels_are_compiled_in_memory(made, capsys, monkeypatch):

@@ -6,12 +6,14 @@ same input gives the same bits in every process.
 
 The cache is the folder `__pycache__` beside the sources where that can be written, else Numba's folder in the user's
 directory for caches (`NUMBA_CACHE_DIR` names another); where none can be written every process compiles for itself.
+What has been compiled serves as long as the files of a kernel, and of all that it calls, are what they were.
 With `NUMBA_DISABLE_JIT=1` kernels are the Python functions that they are written as.
 """
 
 from __future__ import annotations
 
 import gc
+import pickle
 import sys
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -83,6 +85,26 @@ class _Compilation(event.Listener):
 event.register("numba:compile", _Compilation())
 
 
+def _keep_apart(dispatcher: Any, called: list[Any]) -> None:
+    """Let the cache know a kernel by the files of all kernels that are in it, not by its own alone, and let what other
+    versions have left there, which may name classes that are no more, be as if it were not.
+    """
+    files = dispatcher._cache._cache_file
+    stamps = {files._source_stamp}
+    for kernel in called:
+        if isinstance(kernel, type(dispatcher)):
+            stamps.update(kernel._cache._cache_file._source_stamp)
+    files._source_stamp, load = tuple(sorted(stamps)), files._load_index
+
+    def index() -> Any:
+        try:
+            return load()
+        except (AttributeError, ImportError, EOFError, pickle.UnpicklingError):
+            return {}
+
+    files._load_index = index
+
+
 def kernel(**options: Any) -> Callable[[_Function], _Function]:
     """Decorator of a kernel: `numba.njit` with its cache and these options.
 
@@ -94,10 +116,11 @@ def kernel(**options: Any) -> Callable[[_Function], _Function]:
     def decorate(function: _Function) -> _Function:
         if config.DISABLE_JIT:
             return np.errstate(all="ignore")(function)
-        called = (function.__globals__.get(name) for name in function.__code__.co_names)
+        called = [function.__globals__.get(name) for name in function.__code__.co_names]
         inlined = "fastmath" in options or any(getattr(k, "targetoptions", {}).get("forceinline") for k in called)
         try:
             result = njit(cache=True, forceinline=inlined, **options)(function)
+            _keep_apart(result, called)
         except RuntimeError:  # no folder for the cache
             _print_once(_NO_CACHE)
             result = njit(forceinline=inlined, **options)(function)

@@ -41,7 +41,8 @@ def _stability() -> None:
 
 def _responses() -> None:
     """Exact and rounded contact: period doubling and fold, their curves, the doubled motion; a structure with unknowns
-    at its stop only, one vibration of which decays between contacts.
+    at its stop only, one vibration of which decays between contacts, and one of which three more are faster than
+    its harmonics.
     """
     system = library.reference_oscillator()
     doubling = frequency_response(system, (4.05, 3.9)).bifurcations[0]
@@ -50,9 +51,14 @@ def _responses() -> None:
     system = library.reference_oscillator(regularization=3000.0)
     fold = frequency_response(system, (0.75, 0.79), harmonics=3).bifurcations["LP"][0]
     track(fold, "j", (0.0, 0.03), max_step=0.2)
-    damping, stiffness = np.diag([0.1, 8.0]), np.array([[2.0, -1.0], [-1.0, 2.0]])
-    structure = System(np.eye(2), damping, stiffness, [ElasticStop(0, 5.0, 0.3)], [HarmonicLoad(0, 1.0)])
-    frequency_response(structure, (1.0, 1.02), harmonics=9)
+    for fast in ((), (4e2, 9e2, 2e3)):
+        n = 2 + len(fast)
+        stiffness = np.diag([2.0, 2.0, *fast]) - np.eye(n, k=1) - np.eye(n, k=-1)
+        damping = np.diag([0.1, 8.0, *(1.0 for _ in fast)])
+        structure = System(np.eye(n), damping, stiffness, [ElasticStop(0, 5.0, 0.3)], [HarmonicLoad(0, 1.0)])
+        motion = frequency_response(structure, (1.0, 1.02), harmonics=9).orbits[0]
+        # as normal forms ask for it
+        motion.state().linear.stiffness(motion.basis.multiples * motion.omega, 2)
 
 
 def _in_time() -> None:
