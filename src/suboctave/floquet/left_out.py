@@ -6,15 +6,18 @@ stiffness and c_n of the damping, so that to first order s moves by
 
     sum_n l (k_-n D(s_n) + c_-n D'(s_n)) (k_n r + c_n r'),    s_n = s + i n omega,
 
-l and r what drives the motion and what channels read of it, r' and D' of rates. D is tabulated in sizes, averaged over
-some of the frequency; at resonance two motions repel each other, and move by no more than what couples them. Behind the
-last coefficient that is known those of a stiffness that jumps follow.
+l and r what drives the motion and what channels read of it, r' and D' of rates. Between one and the same channel phases
+of coefficients cancel, and signs of D count; between two its size does. D is tabulated, averaged over some of the
+frequency; at resonance two motions repel each other, and move by no more than what couples them.
+
+Behind the last coefficient that is known those of a stiffness that jumps follow, J / n. A jump meets itself in the
+integral of `D J^2 / Omega^2`, which vanishes over all frequencies where D does so at rest with its first derivative, so
+that the part beyond is as small as that below; it meets others in what free vibrations leave of it until then.
 """
 
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -91,11 +94,6 @@ class LeftOut(NamedTuple):
     average: Array
 
 
-def _turning(values: ComplexArray) -> Array:
-    result: Array = np.abs(values.imag)
-    return result
-
-
 def left_out(blocks: Blocks, slow: int, standing: Poles, flexible: Array) -> LeftOut:
     """What is left out of those blocks that take part where only the first `slow` are followed, others stand in, and a
     spring has no states.
@@ -117,14 +115,16 @@ def left_out(blocks: Blocks, slow: int, standing: Poles, flexible: Array) -> Lef
     tails, average = np.zeros((3, nodes, count, count)), np.zeros(nodes)
     end = _ABOVE * float(blocks.rates[at].max())
     _tabulate(without, len(fast.motion), flexible, unit, end, own, sizes, rates, tails, average)
-    of = [without.exponents[a:e] for a, e in pairwise(without.first.tolist())]
-    turns, decays, speeds = (np.array([f(values).max() for values in of]) for f in (_turning, np.real, np.abs))
-    couples = []
-    for a, e in pairwise(without.first.tolist()):
-        drives, reads = np.linalg.norm(without.driven[a:e], axis=0), np.linalg.norm(without.read[:, :, a:e], axis=2)
-        # of two conjugate states each has half
-        couples.append(np.stack((drives / (e - a), *reads)))
-    return LeftOut(slow, turns, decays, speeds, np.array(couples), unit, own, sizes, rates, tails, average)
+    ends, values = without.first[:-1], without.exponents
+    turns, decays, speeds = (
+        np.maximum.reduceat(part, ends) for part in (np.abs(values.imag), values.real, np.abs(values))
+    )
+    drives = np.sqrt(np.add.reduceat(without.driven**2, ends))
+    reads = np.sqrt(np.add.reduceat(without.read.transpose(2, 0, 1) ** 2, ends))
+    # of two conjugate states each has half
+    drives /= np.diff(without.first)[:, None]
+    couples = np.concatenate((drives[:, None], reads), axis=1)
+    return LeftOut(slow, turns, decays, speeds, couples, unit, own, sizes, rates, tails, average)
 
 
 @kernel(fastmath=_FAST, error_model="numpy")

@@ -17,7 +17,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -25,7 +24,7 @@ import numpy as np
 from suboctave.floquet.blocks import Blocks, in_blocks, separated
 from suboctave.floquet.left_out import LeftOut, Motions, Poles, left_out, moved_without
 from suboctave.harmonic.aft.channel import Group
-from suboctave.harmonic.basis import Array
+from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.linear_part import LinearPart
 
 #: about how many numbers of blocks are tried: what belongs to each of them serves other motions as well
@@ -55,9 +54,8 @@ class Level:
         R of what has no states, (G, G).
     left_out
         What it leaves out; None where that is nothing.
-    states, steepest, work
-        S, the least of the decays, and how much it takes to follow the states, to be compared: what a panel takes, and
-        how many of these there are in a time.
+    states, steepest
+        S, and the least of the decays.
     sizes
         Roots of how far a force in a channel drives the structure's own blocks in units of how much channels read of
         them, and the inverse, (2, own).
@@ -78,7 +76,6 @@ class Level:
     left_out: LeftOut | None
     states: int
     steepest: float
-    work: float
     sizes: Array
 
 
@@ -106,10 +103,9 @@ class Levels:
 
     def __init__(self, blocks: Blocks) -> None:
         self.blocks = blocks
-        self.whole = Choice(_level(blocks, blocks.coupled, None, 0.0), 0.0, np.zeros(blocks.coupled))
+        self.whole = Choice(_level(blocks, blocks.coupled, _nobody(blocks), 0.0), 0.0, np.zeros(blocks.coupled))
         self._cuts = list(range(0, blocks.coupled, max(1, blocks.coupled // _CUTS)))
         self._made: dict[tuple[int, int], Level | None] = {}
-        self._from: dict[tuple[int, int], list[Level]] = {}
 
     def of(self, slow: int, order: int) -> Level | None:
         """The first `slow` blocks of those that take part, with a substitute of an order for all others; None where
@@ -125,37 +121,36 @@ class Levels:
         if np.abs(blocks.exponents[blocks.first[slow] : blocks.first[blocks.coupled]]).min() == 0.0:
             return None  # what is free to move is no spring
         if order == 0:
-            return _level(blocks, slow, None, blocks.flexibility[slow : blocks.coupled].sum(axis=0))
+            return _level(blocks, slow, _nobody(blocks), blocks.flexibility[slow : blocks.coupled].sum(axis=0))
         few = _substitute(blocks, slow, order)
         return None if few is None else _level(blocks, slow, few, 0.0)
 
-    def _beyond(self, slow: int, order: int) -> list[Level]:
-        """The levels of an order with at least so many slow blocks, fewest first."""
-        at = slow, order
-        if at not in self._from:
-            levels = [self.of(cut, order) for cut in self._cuts if cut >= slow]
-            self._from[at] = [level for level in levels if level is not None]
-        return self._from[at]
-
-    def least_work(self, along: Along, resolved: float, tolerable: float) -> Choice:
-        """The level that is least work of those without which multipliers move no farther than is tolerable; all blocks
+    def fewest(self, along: Along, resolved: float, tolerable: float) -> Choice:
+        """The level with fewest states of those without which multipliers move no farther than is tolerable; all blocks
         with rates up to `resolved` have states.
         """
-        least, slow = self.whole, int(np.searchsorted(self.blocks.rates[: self.blocks.coupled], resolved, "right"))
-        for order in _ORDERS if slow < self.blocks.coupled else ():
-            levels = [level for level in self._beyond(slow, order) if level.work < least.level.work]
+        least, count = self.whole, 2 * len(self.blocks.active)
+        cuts = [cut for cut in self._cuts if self.blocks.rates[cut] > resolved]
+        for order in _ORDERS:
             # the more slow blocks there are, the less is left out
-            low, high = 0, len(levels)
+            low, high = 0, sum(int(self.blocks.first[cut]) + count * order < least.level.states for cut in cuts)
             while low < high:
                 middle = (low + high) // 2
-                level, shifts = levels[middle], np.empty(levels[middle].slow)
-                assert level.left_out is not None
-                moved = moved_without(*along, level.left_out, tolerable, shifts)
-                if moved <= tolerable:
-                    high, least = middle, Choice(level, moved, shifts)
-                else:
+                choice = self._tried(along, cuts[middle], order, tolerable)
+                if choice is None:
                     low = middle + 1
+                else:
+                    high, least = middle, choice
         return least
+
+    def _tried(self, along: Along, slow: int, order: int, tolerable: float) -> Choice | None:
+        """A level, None where it leaves out too much or there is none."""
+        level = self.of(slow, order)
+        if level is None or level.left_out is None:
+            return None
+        shifts = np.empty(slow)
+        moved = moved_without(*along, level.left_out, tolerable, shifts)
+        return Choice(level, moved, shifts) if moved <= tolerable else None
 
 
 @lru_cache(maxsize=16)
@@ -165,11 +160,36 @@ def levels_of(linear: LinearPart, groups: tuple[Group, ...]) -> Levels:
 
 
 class _Few(NamedTuple):
-    """Blocks of a substitute: matrices, B and G with G'."""
+    """Blocks of a substitute, as those of `Level`."""
 
-    matrices: list[Array]
+    motion: Array
+    first: np.ndarray
     driven: Array
     read: Array
+    coupling: Array
+    flexibility: Array
+    exponents: ComplexArray
+
+
+def _few(matrices: list[Array], driven: Array, read: Array) -> _Few:
+    """Of blocks with these matrices, driven (S, G) and read (2, G, S)."""
+    count, groups = len(matrices), driven.shape[1]
+    first = np.concatenate(([0], np.cumsum([len(matrix) for matrix in matrices]))).astype(np.int64)
+    motion, exponents = np.zeros((count, 2, 2)), np.empty(first[-1], dtype=complex)
+    coupling, flexibility = np.zeros((count, 2, 2 * groups * groups)), np.zeros((count, groups, groups))
+    for b, matrix in enumerate(matrices):
+        at = slice(first[b], first[b + 1])
+        motion[b, : len(matrix), : len(matrix)] = matrix
+        exponents[at] = np.linalg.eigvals(matrix)
+        coupling[b] = (read[:, :, at] @ driven[at]).ravel(), (read[:, :, at] @ matrix @ driven[at]).ravel()
+        flexibility[b] = -read[0][:, at] @ np.linalg.solve(matrix, driven[at])
+    return _Few(motion, first, driven, read, coupling, flexibility, exponents)
+
+
+def _nobody(blocks: Blocks) -> _Few:
+    """No blocks."""
+    groups = len(blocks.active)
+    return _few([], np.zeros((0, groups)), np.zeros((2, groups, 0)))
 
 
 def _substitute(blocks: Blocks, slow: int, order: int) -> _Few | None:
@@ -203,7 +223,7 @@ def _substitute(blocks: Blocks, slow: int, order: int) -> _Few | None:
     damped = steepest <= max(0.0, float(blocks.decays[slow : blocks.coupled].max()))
     if not (np.linalg.cond(basis) < _PARALLEL and damped and slowest >= blocks.rates[slow] * (1.0 - _SLOWER)):
         return None
-    return _Few(matrices, back @ onto @ driven, read @ right @ basis)
+    return _few(matrices, back @ onto @ driven, read @ right @ basis)
 
 
 def _spanned(vectors: Array, inverse: Array, powers: int) -> Array:
@@ -223,45 +243,34 @@ def _sizes(blocks: Blocks, slow: int) -> Array:
     """See `Level.sizes`."""
     ends, own = blocks.first[: slow + 1], int(blocks.first[slow])
     drives, reads = (blocks.driven[:own] ** 2).sum(axis=1), (blocks.read[0, :, :own] ** 2).sum(axis=0)
-    ratio = (np.add.reduceat(drives, ends[:-1]) / np.add.reduceat(reads, ends[:-1])) ** 0.25 if slow else np.zeros(0)
-    ratio = np.repeat(ratio, np.diff(ends))
+    ratio = np.repeat((_of_blocks(np.add, drives, ends) / _of_blocks(np.add, reads, ends)) ** 0.25, np.diff(ends))
     return np.stack((ratio, 1.0 / ratio))
 
 
-def _level(blocks: Blocks, slow: int, few: _Few | None, flexible: Array | float) -> Level:
+def _of_blocks(together: np.ufunc, values: Array, first: np.ndarray) -> Array:
+    """The states' values (S, ...) taken together in every block."""
+    if len(first) == 1:
+        return np.zeros((0, *values.shape[1:]))
+    result: Array = together.reduceat(values, first[:-1])
+    return result
+
+
+def _level(blocks: Blocks, slow: int, few: _Few, flexible: Array | float) -> Level:
     """The first `slow` blocks, with a substitute and a spring for the others."""
     own, count = int(blocks.first[slow]), len(blocks.active)
-    motion, ends = list(blocks.motion[:slow]), blocks.first[: slow + 1].tolist()
-    coupling, flexibility = list(blocks.coupling[:slow]), list(blocks.flexibility[:slow])
-    driven, read, exponents = blocks.driven[:own], blocks.read[:, :, :own], list(blocks.exponents[:own])
-    added, flexible = np.zeros(count), np.zeros((count, count)) + flexible
-    if few is not None:
-        at = 0
-        for matrix in few.matrices:
-            e = at + len(matrix)
-            drives, g = few.driven[at:e], few.read[:, :, at:e]
-            motion.append(np.zeros((2, 2)))
-            motion[-1][: e - at, : e - at] = matrix
-            coupling.append(np.stack(((g @ drives).ravel(), (g @ matrix @ drives).ravel())))
-            flexibility.append(-g[0] @ np.linalg.solve(matrix, drives))
-            exponents += np.linalg.eigvals(matrix).tolist()
-            added += np.linalg.norm(drives, axis=0) * np.linalg.norm(g[1], axis=1)
-            at = e
-            ends.append(own + at)
-        driven, read = np.concatenate((driven, few.driven)), np.concatenate((read, few.read), axis=2)
-    of = [np.array(exponents[s:e]) for s, e in pairwise(ends)]
-    whole, first = np.array(motion).reshape(len(motion), 2, 2), np.array(ends, dtype=np.int64)
-    driven, read = np.ascontiguousarray(driven), np.ascontiguousarray(read)
-    missing = None
-    if slow < blocks.coupled:
-        standing = Poles(
-            whole[slow:], first[slow:] - own, driven[own:], read[:, :, own:], np.array(exponents[own:], complex)
-        )
-        missing = left_out(blocks, slow, standing, flexible)
-    b, rates, decays = len(motion), *(np.array([part(values).max() for values in of]) for part in (np.abs, np.real))
+    first = np.concatenate((blocks.first[: slow + 1], own + few.first[1:]))
+    driven = np.concatenate((blocks.driven[:own], few.driven))
+    read = np.concatenate((blocks.read[:, :, :own], few.read), axis=2)
+    exponents = np.concatenate((blocks.exponents[:own], few.exponents))
+    rates, decays = (_of_blocks(np.maximum, part, first) for part in (np.abs(exponents), exponents.real))
+    drives, moves = (_of_blocks(np.add, part**2, few.first) for part in (few.driven, few.read[1].T))
+    springs = np.zeros((count, count)) + flexible
     return Level(
-        slow, own, whole, first, driven, read, np.array(coupling).reshape(b, 2, 2 * count * count), rates, decays,
-        np.array(flexibility).reshape(b, count, count), blocks.stiffening[slow] + added, flexible, missing,
-        int(first[-1]), float(decays.min(initial=0.0)),
-        float(first[-1] ** 2 * rates.max(initial=0.0)), _sizes(blocks, slow),
+        slow, own, np.concatenate((blocks.motion[:slow], few.motion)), first, driven, read,
+        np.concatenate((blocks.coupling[:slow], few.coupling)), rates, decays,
+        np.concatenate((blocks.flexibility[:slow], few.flexibility)),
+        blocks.stiffening[slow] + np.sqrt(drives * moves).sum(axis=0), springs,
+        left_out(blocks, slow, Poles(few.motion, few.first, few.driven, few.read, few.exponents), springs)
+        if slow < blocks.coupled else None,
+        int(first[-1]), float(decays.min(initial=0.0)), _sizes(blocks, slow),
     )  # fmt: skip

@@ -149,7 +149,7 @@ class _Linearised:
         self.events = events[np.argsort(events[:, 0], kind="stable")]
         panels, start = panels_between(self.events, longest)
         self._evaluated(panels)
-        self._choice = self._levels.least_work(self._along(), self._beyond, self._tolerable)
+        self._choice = self._levels.fewest(self._along(), self._beyond, self._tolerable)
         self._level = self._choice.level
         self._contacts()
         for _ in range(_DIVIDED):
