@@ -202,7 +202,7 @@ class Motions(NamedTuple):
     see `motions`.
 
     exponents, left
-        Their exponents, and what of them a period leaves, (B,).
+        Their exponents, and what of them a period leaves, (B,); of those that it leaves nothing of no more is known.
     force, back
         Sizes of the forces that a motion makes by the coefficients 0, 1, ..., (B, N, G), and of what drives it of
         displacements and rates by these, (B, N, 2, G).
@@ -297,7 +297,7 @@ def motions(tangents, active, rate, blocks, count):
     for i in range(count):
         exponents[i] = _motion(blocks, i, rate, drives, reads)
         left[i] = math.exp(min(0.0, exponents[i].real) * 2.0 * math.pi / rate)
-        for g in range(groups):
+        for g in range(groups if left[i] > _GONE else 0):
             drive, read, moving = abs(drives[g]), abs(reads[0, g]), abs(reads[1, g])
             for n in range(known + 1):
                 stiff, damp = abs(tangents[0, active[g], n]), abs(tangents[1, active[g], n])

@@ -52,7 +52,7 @@ from suboctave.floquet.exponentials import TURNS, structure
 from suboctave.floquet.forms import form_of, forms_along
 from suboctave.floquet.left_out import beyond, motions, of_the_rest, poles
 from suboctave.floquet.levels import Along, levels_of
-from suboctave.floquet.propagate import closed, march, multipliers_and_shifts, response
+from suboctave.floquet.propagate import closed, march, multipliers_and_shifts, response, without_nearest
 from suboctave.floquet.resolution import ACCURACY, divided, longest_rest, stretches, tolerated
 from suboctave.floquet.result import FloquetResult
 from suboctave.floquet.structural import with_structural_damping
@@ -322,9 +322,7 @@ class _Linearised:
             real, imaginary, left, right, after, self.before, self.own, self.missing, self._doubt(change, share), mu,
             shift,
         )  # fmt: skip
-        self.standing = self._all_standing
-        for strange in mu[self.own :]:
-            self.standing = np.delete(self.standing, np.abs(self.standing - strange).argmin())
+        self.standing = without_nearest(self._all_standing, mu[self.own :])
         mu, shift = mu[: self.own], shift[:, : self.own]
         # where multipliers meet on their way the first order tells too little: each has at least come from the nearest
         np.maximum(shift[0], np.abs(mu[:, None] - self.standing).min(axis=1), out=shift[0])
