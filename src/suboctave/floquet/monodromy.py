@@ -72,8 +72,8 @@ from suboctave.interruption import check_time
 from suboctave.lazy import lazy
 
 #: how far what is left out of a structure may move multipliers, and how much further where a force is left unbalanced
-#: altogether, which does more
-_NEGLECTED = (1e-5, 3e-4)
+#: altogether; beside grazing the correction by that force moves them hundreds of times as much
+_NEGLECTED = (1e-5, 3e-5)
 #: how many times the first order of that is stated
 _ASSURED = 2.0
 #: longest panels in units of the time scales of the forces, of the blocks as channels see them, and of the blocks; how
