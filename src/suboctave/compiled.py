@@ -85,15 +85,22 @@ class _Compilation(event.Listener):
 event.register("numba:compile", _Compilation())
 
 
+def _files(kernel: Any) -> Any:
+    """Numba's index of what it has compiled of a kernel; None of anything else, or where nothing is kept."""
+    return getattr(getattr(kernel, "_cache", None), "_cache_file", None)
+
+
 def _keep_apart(dispatcher: Any, called: list[Any]) -> None:
     """Let the cache know a kernel by the files of all kernels that are in it, not by its own alone, and let what other
     versions have left there, which may name classes that are no more, be as if it were not.
     """
-    files = dispatcher._cache._cache_file
+    files = _files(dispatcher)
+    if files is None:
+        return
     stamps = {files._source_stamp}
     for kernel in called:
-        if isinstance(kernel, type(dispatcher)):
-            stamps.update(kernel._cache._cache_file._source_stamp)
+        if _files(kernel) is not None:
+            stamps.update(_files(kernel)._source_stamp)
     files._source_stamp, load = tuple(sorted(stamps)), files._load_index
 
     def index() -> Any:

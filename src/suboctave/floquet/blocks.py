@@ -17,6 +17,7 @@ Blocks that no channel both reads and drives change no multiplier and come last.
 from __future__ import annotations
 
 from functools import lru_cache
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -203,6 +204,44 @@ def separated(matrix: Array) -> tuple[Array, Array, list[Array]]:
         blocks.append(np.array([[value.real, value.imag], [-value.imag, value.real]])[:width, :width])
     basis = np.stack(columns, axis=1)
     return basis, np.asarray(np.linalg.inv(basis), dtype=float), blocks
+
+
+class States(NamedTuple):
+    """Blocks of given matrices, as those of `Blocks`."""
+
+    motion: Array
+    first: np.ndarray
+    driven: Array
+    read: Array
+    coupling: Array
+
+
+def states_of(matrices: list[Array], driven: Array, read: Array) -> States:
+    """Blocks with these matrices L, driven (S, G) and read (2, G, S)."""
+    count, groups = len(matrices), driven.shape[1]
+    first = np.concatenate(([0], np.cumsum([len(matrix) for matrix in matrices]))).astype(np.int64)
+    motion, coupling = np.zeros((count, 2, 2)), np.zeros((count, 2, 2 * groups * groups))
+    for b, matrix in enumerate(matrices):
+        at = slice(first[b], first[b + 1])
+        motion[b, : len(matrix), : len(matrix)] = matrix
+        coupling[b] = (read[:, :, at] @ driven[at]).ravel(), (read[:, :, at] @ matrix @ driven[at]).ravel()
+    return States(motion, first, driven, read, coupling)
+
+
+def of_blocks(together: np.ufunc, values: Array, first: np.ndarray) -> Array:
+    """The states' values (S, ...) taken together in every block, (B, ...)."""
+    if len(first) == 1:
+        return np.zeros((0, *values.shape[1:]))
+    result: Array = together.reduceat(values, first[:-1])
+    return result
+
+
+def in_one(motion: Array, first: np.ndarray) -> Array:
+    """The matrix of all states of blocks, (S, S)."""
+    whole = np.zeros((first[-1] - first[0],) * 2)
+    for b, (s, e) in enumerate(pairwise(first - first[0])):
+        whole[s:e, s:e] = motion[b, : e - s, : e - s]
+    return whole
 
 
 def _arranged(parts: _Parts, n: int, left: Array, right: Array, active: np.ndarray, rounding: float) -> Blocks:

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from suboctave.floquet.blocks import separated
+from suboctave.floquet.blocks import in_one, separated, states_of
 from suboctave.floquet.levels import Level
 from suboctave.harmonic.basis import Array
 
@@ -68,11 +68,7 @@ def form_of(level: Level, held: tuple[float, ...]) -> Form | None:
         return free
     stiffness, flexible, one = np.diag(held), free.flexible, np.eye(count)
     raised = np.linalg.inv(one - flexible @ stiffness)
-    matrix = np.zeros((size, size))
-    for b in range(len(level.motion)):
-        s, e = first[b], first[b + 1]
-        matrix[s:e, s:e] = level.motion[b, : e - s, : e - s]
-    matrix += free.driven @ (stiffness @ raised @ free.read[0])
+    matrix = in_one(level.motion, first) + free.driven @ (stiffness @ raised @ free.read[0])
     try:
         basis, inverse, found = separated(matrix)
     except np.linalg.LinAlgError:  # two of them are the same
@@ -82,15 +78,11 @@ def form_of(level: Level, held: tuple[float, ...]) -> Form | None:
         return None
     driven = inverse @ free.driven @ np.linalg.inv(one - stiffness @ flexible)
     read = np.stack((raised @ free.read[0] @ basis, free.read[1] @ basis))
-    motion, coupling, ends = np.zeros((len(found), 2, 2)), np.zeros((len(found), 2, 2 * count * count)), [0]
-    for b, block in enumerate(found):
-        s, e = ends[-1], ends[-1] + len(block)
-        motion[b, : e - s, : e - s] = block
-        coupling[b] = (read[:, :, s:e] @ driven[s:e]).ravel(), (read[:, :, s:e] @ block @ driven[s:e]).ravel()
-        ends.append(e)
+    held_blocks = states_of(found, driven, read)
     return Form(
-        motion, np.array(ends), driven, read, _in_a_row(coupling), raised @ flexible, basis, inverse, condition * _EPS
-    )
+        held_blocks.motion, held_blocks.first, driven, read, _in_a_row(held_blocks.coupling), raised @ flexible, basis,
+        inverse, condition * _EPS,
+    )  # fmt: skip
 
 
 def _in_a_row(coupling: Array) -> Array:

@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from suboctave.compiled import kernel
-from suboctave.floquet.blocks import Blocks
+from suboctave.floquet.blocks import Blocks, States, of_blocks
 from suboctave.harmonic.basis import Array, ComplexArray
 
 #: sums may be reordered; infinities keep their meaning
@@ -38,9 +38,8 @@ _SILENT = 1e-8
 #: how many frequencies of a table there are up to the slowest block left out, how many times this they reach, and the
 #: ratio of those beyond, up to so many times the fastest
 _PARTS, _REACH, _RATIO, _ABOVE = 8, 6, 1.25, 4.0
-#: how much farther than a motion of one block those may be moved that stiffness and damping make of several, and how
-#: much farther than others multipliers may that have decayed
-_OTHERS, _FREER = 2.0, 30.0
+#: how much farther than those at the circle multipliers may be moved that decay to nothing in a period
+_FREER = 30.0
 #: over which share of a frequency D is averaged
 _AVERAGED = 0.1
 
@@ -94,107 +93,60 @@ class LeftOut(NamedTuple):
     average: Array
 
 
-def left_out(blocks: Blocks, slow: int, standing: Poles, flexible: Array) -> LeftOut:
-    """What is left out of those blocks that take part where only the first `slow` are followed, others stand in, and a
-    spring has no states.
+def left_out(blocks: Blocks, slow: int, few: States, exponents: ComplexArray, flexible: Array) -> LeftOut:
+    """What is left out of those blocks that take part where only the first `slow` are followed, a few others with these
+    exponents stand in, and a spring has no states.
     """
     at, states = slice(slow, blocks.coupled), slice(blocks.first[slow], blocks.first[blocks.coupled])
-    fast = Poles(
-        blocks.motion[at], blocks.first[slow : blocks.coupled + 1] - states.start, blocks.driven[states],
-        blocks.read[:, :, states], blocks.exponents[states],
-    )  # fmt: skip
-    without = Poles(
-        np.concatenate((fast.motion, standing.motion)),
-        np.concatenate((fast.first, standing.first[1:] + fast.first[-1])),
-        np.concatenate((fast.driven, standing.driven)),
-        np.concatenate((fast.read, standing.read), axis=2),
-        np.concatenate((fast.exponents, standing.exponents)),
-    )
-    nodes, count, unit = _PARTS * _REACH + 1, len(blocks.active), float(blocks.rates[slow]) / _PARTS
-    own, (sizes, rates) = np.zeros((nodes, count), dtype=complex), np.zeros((2, nodes, count, count))
-    tails, average = np.zeros((3, nodes, count, count)), np.zeros(nodes)
-    end = _ABOVE * float(blocks.rates[at].max())
-    _tabulate(without, len(fast.motion), flexible, unit, end, own, sizes, rates, tails, average)
-    ends, values = without.first[:-1], without.exponents
+    ends = np.concatenate((blocks.first[slow : blocks.coupled] - states.start, few.first + states.stop - states.start))
+    values = np.concatenate((blocks.exponents[states], exponents))
+    driven, read = (np.concatenate(pair) for pair in (
+        (blocks.driven[states], few.driven), (blocks.read[:, :, states].T, few.read.T)
+    ))  # fmt: skip
     turns, decays, speeds = (
-        np.maximum.reduceat(part, ends) for part in (np.abs(values.imag), values.real, np.abs(values))
+        of_blocks(np.maximum, part, ends) for part in (np.abs(values.imag), values.real, np.abs(values))
     )
-    drives = np.sqrt(np.add.reduceat(without.driven**2, ends))
-    reads = np.sqrt(np.add.reduceat(without.read.transpose(2, 0, 1) ** 2, ends))
     # of two conjugate states each has half
-    drives /= np.diff(without.first)[:, None]
-    couples = np.concatenate((drives[:, None], reads), axis=1)
-    return LeftOut(slow, turns, decays, speeds, couples, unit, own, sizes, rates, tails, average)
+    drives = np.sqrt(of_blocks(np.add, driven**2, ends)) / np.diff(ends)[:, None]
+    reads = np.sqrt(of_blocks(np.add, read**2, ends)).transpose(0, 2, 1)
+    couples = np.ascontiguousarray(np.concatenate((drives[:, None], reads), axis=1))
+
+    unit, nodes = float(blocks.rates[slow]) / _PARTS, _PARTS * _REACH + 1
+    steps = max(0, math.ceil(math.log(_ABOVE * blocks.rates[at].max() / (unit * (nodes - 1))) / math.log(_RATIO)))
+    w = unit * np.concatenate((np.arange(nodes), (nodes - 1) * _RATIO ** np.arange(1, steps + 1)))
+    coupling = np.concatenate((blocks.coupling[at], -few.coupling))
+    motion = np.concatenate((blocks.motion[at], few.motion))
+    missing = _responses(motion, ends, coupling, values, np.asarray((_AVERAGED + 1j) * w, dtype=complex)).reshape(
+        len(w), 2, *flexible.shape
+    )
+    missing[:, 0] -= flexible
+    own, sizes, rates = np.einsum("wgg->wg", missing[:, 0]), np.abs(missing[:, 0]), np.abs(missing[:, 1])
+    # from each frequency to the next, and from the last one on
+    upto = np.append(w[:-1] / w[1:], 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        by_square, by_cube = ((1.0 - upto**power) / w**power for power in (1, 2))
+    by_square[0] = by_cube[0] = 0.0
+    parts = np.stack((by_square * missing[:, 0].real.T, by_cube * missing[:, 0].imag.T, by_square * rates.T))
+    tails = np.abs(parts[..., ::-1].cumsum(axis=-1)[..., ::-1]).transpose(0, 3, 2, 1)
+    average = w * (by_square * sizes.max(axis=(1, 2)))[::-1].cumsum()[::-1]
+    np.einsum("wgg->wg", sizes)[:] = 0.0
+    return LeftOut(
+        slow, turns, decays, speeds, couples, unit, np.ascontiguousarray(own[:nodes]), sizes[:nodes], rates[:nodes],
+        np.ascontiguousarray(tails[:, :nodes]), average[:nodes],
+    )  # fmt: skip
 
 
-@kernel(fastmath=_FAST, error_model="numpy")
-def _transfer(blocks, b, s, sign, out):
-    """Add sign times H and H' of a block at s to out (2, G, G)."""
-    a, e = blocks.first[b], blocks.first[b + 1]
-    trace = determinant = 0.0j
-    m = blocks.motion[b]
-    if e - a == 1:
-        determinant = s - m[0, 0]
-    else:
-        trace = s - m[0, 0] - m[1, 1]
-        determinant = (s - blocks.exponents[a]) * (s - blocks.exponents[a + 1])
-    for h in range(out.shape[2]):
-        x = blocks.driven[a, h] + 0.0j
-        y = 0.0j
-        if e - a == 2:
-            z = blocks.driven[a + 1, h]
-            x, y = trace * x + m[0, 0] * x + m[0, 1] * z, trace * z + m[1, 0] * x + m[1, 1] * z
-        x, y = sign * x / determinant, sign * y / determinant
-        for part in range(2):
-            for g in range(out.shape[1]):
-                out[part, g, h] += blocks.read[part, g, a] * x
-                if e - a == 2:
-                    out[part, g, h] += blocks.read[part, g, a + 1] * y
-
-
-@kernel(fastmath=_FAST, error_model="numpy")
-def _missing_at(blocks, fast, flexible, w, out):
-    """D and D' at a frequency w into out (2, G, G)."""
-    for g in range(flexible.shape[0]):
-        for h in range(flexible.shape[0]):
-            out[0, g, h], out[1, g, h] = complex(-flexible[g, h], 0.0), 0.0j
-    for b in range(blocks.motion.shape[0]):
-        _transfer(blocks, b, complex(_AVERAGED * w, w), 1.0 if b < fast else -1.0, out)
-
-
-@kernel(fastmath=_FAST, error_model="numpy")
-def _tabulate(blocks, fast, flexible, unit, end, own, sizes, rates, tails, average):
-    """Fill the tables of `LeftOut`, of `fast` blocks that are left out and others that stand in for them."""
-    groups, nodes = flexible.shape[0], average.shape[0]
-    out, rest = np.empty((2, groups, groups), dtype=np.complex128), np.zeros((3, groups, groups))
-    last, seldom = (nodes - 1) * unit, 0.0
-    steps = max(0, math.ceil(math.log(end / last) / math.log(_RATIO)))
-    for k in range(nodes - 1 + steps, -1, -1):
-        w = k * unit if k < nodes else last * _RATIO ** (k - nodes + 1)
-        _missing_at(blocks, fast, flexible, w, out)
-        # from there to the next, and from the last one on
-        upto = 0.0
-        if k < nodes - 1 + steps:
-            upto = w / ((k + 1) * unit) if k < nodes - 1 else 1.0 / _RATIO
-        largest = 0.0
-        for g in range(groups):
-            for h in range(groups):
-                if w > 0.0:
-                    rest[0, g, h] += out[0, g, h].real * (1.0 - upto) / w
-                    rest[1, g, h] += out[0, g, h].imag * (1.0 - upto * upto) / (w * w)
-                    rest[2, g, h] += abs(out[1, g, h]) * (1.0 - upto) / w
-                largest = max(largest, abs(out[0, g, h]))
-                if k < nodes:
-                    if g == h:
-                        own[k, g] = out[0, g, h]
-                    else:
-                        sizes[k, g, h] = abs(out[0, g, h])
-                    rates[k, g, h] = abs(out[1, g, h])
-                    for part in range(3):
-                        tails[part, k, g, h] = abs(rest[part, g, h])
-        seldom += largest * (1.0 - upto) / w if w > 0.0 else 0.0
-        if k < nodes:
-            average[k] = w * seldom
+def _responses(
+    motion: Array, ends: np.ndarray, coupling: Array, exponents: ComplexArray, s: ComplexArray
+) -> ComplexArray:
+    """G (s - L)^-1 B of all blocks together, (W, 2 G G): `((s - tr L) G B + G L B) / det(s - L)` of two states."""
+    double = np.diff(ends) == 2
+    near = s[:, None] - exponents[ends[:-1]]
+    far = np.where(double, s[:, None] - exponents[ends[1:] - 1], 1.0)
+    trace = np.where(double, s[:, None] - motion[:, 0, 0] - motion[:, 1, 1], 1.0)
+    own, turned = coupling.transpose(1, 0, 2)
+    result: ComplexArray = (trace / (near * far)) @ own + (double / (near * far)) @ turned
+    return result
 
 
 class Motions(NamedTuple):
@@ -381,10 +333,9 @@ def _by_jumps(missing, last, nu, force, back):
     low, high = j + 1.0 - where, where - j
     for g in range(groups):
         for h in range(groups):
-            tail = missing.tails[:, j, g, h]
-            next = missing.tails[:, j + 1, g, h]
-            by = low * (tail[0] + nu * tail[1]) + high * (next[0] + nu * next[1])
-            total += (back[0, g] * by + back[1, g] * (low * tail[2] + high * next[2])) * force[h]
+            before, after = missing.tails[:, j, g, h], missing.tails[:, j + 1, g, h]
+            by = low * (before[0] + nu * before[1]) + high * (after[0] + nu * after[1])
+            total += (back[0, g] * by + back[1, g] * (low * before[2] + high * after[2])) * force[h]
     return total
 
 
@@ -414,7 +365,7 @@ def moved_without(known, rate, last, waits, missing, most, shifts):
         shift += _repelled(known, i, missing, rate, last, waits) + abs(own)
         if known.jumps:
             shift += 2.0 * rate * _by_jumps(missing, last, nu, known.jumping[i, 0], known.struck[i, 0])
-        shifts[i] = _OTHERS * shift * 2.0 * math.pi / rate
+        shifts[i] = shift * 2.0 * math.pi / rate
         largest = max(largest, shifts[i])
         far = 1.0 + _FREER * (1.0 - known.left[i])
         worst = max(worst, known.left[i] * math.expm1(min(shifts[i], 1.0)) / far)

@@ -17,14 +17,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
-from suboctave.floquet.blocks import Blocks, in_blocks, separated
-from suboctave.floquet.left_out import LeftOut, Motions, Poles, left_out, moved_without
+from suboctave.floquet.blocks import Blocks, States, in_blocks, in_one, of_blocks, separated, states_of
+from suboctave.floquet.left_out import LeftOut, Motions, left_out, moved_without
 from suboctave.harmonic.aft.channel import Group
-from suboctave.harmonic.basis import Array, ComplexArray
+from suboctave.harmonic.basis import Array
 from suboctave.harmonic.linear_part import LinearPart
 
 #: about how many numbers of blocks are tried: what belongs to each of them serves other motions as well
@@ -80,7 +81,7 @@ class Level:
 
 
 class Along(NamedTuple):
-    """A motion as levels are chosen by it: see `left_out.moved_without`."""
+    """A motion as levels are chosen by it: the first arguments of `left_out.moved_without`."""
 
     known: Motions
     rate: float
@@ -103,7 +104,7 @@ class Levels:
 
     def __init__(self, blocks: Blocks) -> None:
         self.blocks = blocks
-        self.whole = Choice(_level(blocks, blocks.coupled, _nobody(blocks), 0.0), 0.0, np.zeros(blocks.coupled))
+        self.whole = Choice(_level(blocks, blocks.coupled), 0.0, np.zeros(blocks.coupled))
         self._cuts = list(range(0, blocks.coupled, max(1, blocks.coupled // _CUTS)))
         self._made: dict[tuple[int, int], Level | None] = {}
 
@@ -121,9 +122,9 @@ class Levels:
         if np.abs(blocks.exponents[blocks.first[slow] : blocks.first[blocks.coupled]]).min() == 0.0:
             return None  # what is free to move is no spring
         if order == 0:
-            return _level(blocks, slow, _nobody(blocks), blocks.flexibility[slow : blocks.coupled].sum(axis=0))
+            return _level(blocks, slow, None, blocks.flexibility[slow : blocks.coupled].sum(axis=0))
         few = _substitute(blocks, slow, order)
-        return None if few is None else _level(blocks, slow, few, 0.0)
+        return None if few is None else _level(blocks, slow, few)
 
     def fewest(self, along: Along, resolved: float, tolerable: float) -> Choice:
         """The level with fewest states of those without which multipliers move no farther than is tolerable; all blocks
@@ -159,40 +160,7 @@ def levels_of(linear: LinearPart, groups: tuple[Group, ...]) -> Levels:
     return Levels(in_blocks(linear, groups))
 
 
-class _Few(NamedTuple):
-    """Blocks of a substitute, as those of `Level`."""
-
-    motion: Array
-    first: np.ndarray
-    driven: Array
-    read: Array
-    coupling: Array
-    flexibility: Array
-    exponents: ComplexArray
-
-
-def _few(matrices: list[Array], driven: Array, read: Array) -> _Few:
-    """Of blocks with these matrices, driven (S, G) and read (2, G, S)."""
-    count, groups = len(matrices), driven.shape[1]
-    first = np.concatenate(([0], np.cumsum([len(matrix) for matrix in matrices]))).astype(np.int64)
-    motion, exponents = np.zeros((count, 2, 2)), np.empty(first[-1], dtype=complex)
-    coupling, flexibility = np.zeros((count, 2, 2 * groups * groups)), np.zeros((count, groups, groups))
-    for b, matrix in enumerate(matrices):
-        at = slice(first[b], first[b + 1])
-        motion[b, : len(matrix), : len(matrix)] = matrix
-        exponents[at] = np.linalg.eigvals(matrix)
-        coupling[b] = (read[:, :, at] @ driven[at]).ravel(), (read[:, :, at] @ matrix @ driven[at]).ravel()
-        flexibility[b] = -read[0][:, at] @ np.linalg.solve(matrix, driven[at])
-    return _Few(motion, first, driven, read, coupling, flexibility, exponents)
-
-
-def _nobody(blocks: Blocks) -> _Few:
-    """No blocks."""
-    groups = len(blocks.active)
-    return _few([], np.zeros((0, groups)), np.zeros((2, groups, 0)))
-
-
-def _substitute(blocks: Blocks, slow: int, order: int) -> _Few | None:
+def _substitute(blocks: Blocks, slow: int, order: int) -> States | None:
     """That of the blocks from `slow` on; None where these have no more states than it, or it would be no damped motion
     as fast as they are.
     """
@@ -200,11 +168,8 @@ def _substitute(blocks: Blocks, slow: int, order: int) -> _Few | None:
     size = int(last - first)
     if size <= 2 * order * count:
         return None
-    whole, inverse = np.zeros((size, size)), np.zeros((size, size))
-    for b in range(slow, blocks.coupled):
-        s, e = blocks.first[b] - first, blocks.first[b + 1] - first
-        whole[s:e, s:e] = blocks.motion[b, : e - s, : e - s]
-        inverse[s:e, s:e] = np.linalg.inv(whole[s:e, s:e])
+    whole = in_one(blocks.motion[slow : blocks.coupled], blocks.first[slow : blocks.coupled + 1])
+    inverse: Array = np.asarray(np.linalg.inv(whole), dtype=float)
     driven, read = blocks.driven[first:last], blocks.read[:, :, first:last]
     right = _spanned(inverse @ driven, inverse, 2 * order)
     left = _spanned(inverse.T @ read[0].T, inverse.T, 2 * order)
@@ -223,7 +188,7 @@ def _substitute(blocks: Blocks, slow: int, order: int) -> _Few | None:
     damped = steepest <= max(0.0, float(blocks.decays[slow : blocks.coupled].max()))
     if not (np.linalg.cond(basis) < _PARALLEL and damped and slowest >= blocks.rates[slow] * (1.0 - _SLOWER)):
         return None
-    return _few(matrices, back @ onto @ driven, read @ right @ basis)
+    return states_of(matrices, back @ onto @ driven, read @ right @ basis)
 
 
 def _spanned(vectors: Array, inverse: Array, powers: int) -> Array:
@@ -243,34 +208,31 @@ def _sizes(blocks: Blocks, slow: int) -> Array:
     """See `Level.sizes`."""
     ends, own = blocks.first[: slow + 1], int(blocks.first[slow])
     drives, reads = (blocks.driven[:own] ** 2).sum(axis=1), (blocks.read[0, :, :own] ** 2).sum(axis=0)
-    ratio = np.repeat((_of_blocks(np.add, drives, ends) / _of_blocks(np.add, reads, ends)) ** 0.25, np.diff(ends))
+    ratio = np.repeat((of_blocks(np.add, drives, ends) / of_blocks(np.add, reads, ends)) ** 0.25, np.diff(ends))
     return np.stack((ratio, 1.0 / ratio))
 
 
-def _of_blocks(together: np.ufunc, values: Array, first: np.ndarray) -> Array:
-    """The states' values (S, ...) taken together in every block."""
-    if len(first) == 1:
-        return np.zeros((0, *values.shape[1:]))
-    result: Array = together.reduceat(values, first[:-1])
-    return result
-
-
-def _level(blocks: Blocks, slow: int, few: _Few, flexible: Array | float) -> Level:
+def _level(blocks: Blocks, slow: int, few: States | None = None, flexible: Array | float = 0.0) -> Level:
     """The first `slow` blocks, with a substitute and a spring for the others."""
     own, count = int(blocks.first[slow]), len(blocks.active)
+    if few is None:
+        few = states_of([], np.zeros((0, count)), np.zeros((2, count, 0)))
+    matrices = [few.motion[b, :width, :width] for b, width in enumerate(np.diff(few.first))]
+    exponents = np.concatenate((blocks.exponents[:own], *map(np.linalg.eigvals, matrices)))
+    bending = [
+        -few.read[0][:, s:e] @ np.linalg.solve(matrix, few.driven[s:e])
+        for matrix, (s, e) in zip(matrices, pairwise(few.first), strict=True)
+    ]
     first = np.concatenate((blocks.first[: slow + 1], own + few.first[1:]))
-    driven = np.concatenate((blocks.driven[:own], few.driven))
-    read = np.concatenate((blocks.read[:, :, :own], few.read), axis=2)
-    exponents = np.concatenate((blocks.exponents[:own], few.exponents))
-    rates, decays = (_of_blocks(np.maximum, part, first) for part in (np.abs(exponents), exponents.real))
-    drives, moves = (_of_blocks(np.add, part**2, few.first) for part in (few.driven, few.read[1].T))
+    rates, decays = (of_blocks(np.maximum, part, first) for part in (np.abs(exponents), exponents.real))
+    drives, moves = (of_blocks(np.add, part**2, few.first) for part in (few.driven, few.read[1].T))
     springs = np.zeros((count, count)) + flexible
     return Level(
-        slow, own, np.concatenate((blocks.motion[:slow], few.motion)), first, driven, read,
+        slow, own, np.concatenate((blocks.motion[:slow], few.motion)), first,
+        np.concatenate((blocks.driven[:own], few.driven)), np.concatenate((blocks.read[:, :, :own], few.read), axis=2),
         np.concatenate((blocks.coupling[:slow], few.coupling)), rates, decays,
-        np.concatenate((blocks.flexibility[:slow], few.flexibility)),
+        np.concatenate((blocks.flexibility[:slow], *(one[None] for one in bending))),
         blocks.stiffening[slow] + np.sqrt(drives * moves).sum(axis=0), springs,
-        left_out(blocks, slow, Poles(few.motion, few.first, few.driven, few.read, few.exponents), springs)
-        if slow < blocks.coupled else None,
+        left_out(blocks, slow, few, exponents[own:], springs) if slow < blocks.coupled else None,
         int(first[-1]), float(decays.min(initial=0.0)), _sizes(blocks, slow),
     )  # fmt: skip

@@ -8,10 +8,10 @@ the constant stiffnesses of contacts in them:
 
 For blocks that are too fast for the motion a few others stand in (`levels`), and their multipliers are those of the
 motion with the means of stiffness and damping, to first order. How far that moves the others follows to first order
-from the spectra of stiffness and damping (`levels.moved_without`): it decides which blocks are meant, and belongs to
+from the spectra of stiffness and damping (`left_out.moved_without`): it decides which blocks are meant, and belongs to
 the errors, the more the less multipliers are apart. So does the share of the correction below that such blocks make.
-Perturbations that decay while no channel acts need not be followed either: the period begins with the longest
-such time.
+Perturbations that decay while no channel acts need not be followed either: the period begins with the longest such
+time.
 
 Here r is the force that the motion leaves unbalanced. All elements along one direction are one channel. Laws that their
 smoothness class is all of are evaluated in compiled code, all others at all nodes at once (`channels`).
@@ -71,11 +71,11 @@ from suboctave.harmonic.quadrature import search_grid, singular_instants
 from suboctave.interruption import check_time
 from suboctave.lazy import lazy
 
-#: how far what is left out of a structure may move multipliers, and how much further where a force is left unbalanced
-#: altogether; beside grazing the correction by that force moves them hundreds of times as much
-_NEGLECTED = (1e-5, 3e-5)
-#: how many times the first order of that is stated
-_ASSURED = 2.0
+#: how far what is left out of a structure may move multipliers, to first order, and how much further where a force is
+#: left unbalanced altogether; beside grazing the correction by that force moves them hundreds of times as much
+_NEGLECTED = (5e-6, 1.5e-5)
+#: how many times that first order is stated: it is that of motions of single blocks, of which stiffness makes others
+_ASSURED = 4.0
 #: longest panels in units of the time scales of the forces, of the blocks as channels see them, and of the blocks; how
 #: much less these count if they are seen little, as a power: with them multipliers are good for 1e-8
 _LENGTHS = (1.2, 1.8, TURNS, 1.0 / 12.0)
