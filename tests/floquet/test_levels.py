@@ -7,6 +7,7 @@ from many_modes import motion_of, structure
 import suboctave as so
 from suboctave.floquet import monodromy
 from suboctave.floquet.blocks import in_blocks
+from suboctave.floquet.left_out import Jumps, _echoes
 from suboctave.floquet.levels import levels_of
 from suboctave.floquet.monodromy import floquet_multipliers
 from suboctave.floquet.symmetric import distinct
@@ -74,6 +75,28 @@ def test_stated_errors_cover_what_is_left_out(kind, channels, smooth, monkeypatc
         assert alive.sum() >= 4
         assert np.all(apart[alive] <= result.errors[alive] + whole.errors[alive])
         assert np.all(apart[np.abs(result.multipliers) > 0.5] < 1e-3)
+
+
+@pytest.mark.parametrize("wait", [0.02, 0.3])
+def test_jumps_meet_in_free_vibrations(wait):
+    """What two jumps of stiffness make together of all coefficients behind the last one known, summed one by one."""
+    rate, last, orders = 1.1, 20.5, np.arange(21, 20_001)
+    system, _ = structure(24, 300.0, 1, "modal", 1)
+    state = motion_of(system, 9, rate, 1)
+    levels = levels_of(state.linear, state.balance.all_groups)
+    blocks, level = levels.blocks, levels.of(16, 1)
+    assert blocks.rates[16] > 1.5 * last * rate
+
+    def missing(s):
+        own = flexibility(level.motion, level.first, level.driven, level.read, s) + level.flexible
+        return flexibility(blocks.motion, blocks.first, blocks.driven, blocks.read, s)[0, 0] - own[0, 0]
+
+    # coefficients 1 / n, of jumps at 0 and at `wait`: what is left when each alone is taken from both
+    both = sum(missing(1j * n * rate).real * 4.0 * np.cos(n * wait) / n**2 for n in orders)
+    jumps = Jumps(np.array([0.0, wait]), np.zeros(2, dtype=np.int64))
+    # that of two jumps, each of them half of the squares
+    echoes = 4.0 * rate * _echoes(level.left_out, rate, last * rate, jumps)[0, 0, 0]
+    assert echoes == pytest.approx(abs(both), rel=0.2)
 
 
 def test_few_states_serve_a_long_chain():

@@ -11,8 +11,13 @@ of coefficients cancel, and signs of D count; between two its size does. D is ta
 frequency; at resonance two motions repel each other, and move by no more than what couples them.
 
 Behind the last coefficient that is known those of a stiffness that jumps follow, J / n. A jump meets itself in the
-integral of `D J^2 / Omega^2`, which vanishes over all frequencies where D does so at rest with its first derivative, so
-that the part beyond is as small as that below; it meets others in what free vibrations leave of it until then.
+integral of `D J^2 / Omega^2`, which vanishes over all frequencies where D does so at rest with its first derivative:
+the part beyond takes back that below. It meets one that comes a time t later in the free vibrations between,
+
+    2 pi J^2 sum_k c_k exp(s_k t) / s_k^2,    D(s) = sum_k c_k / (s - s_k),
+
+where soon after a jump those that stand in nearly cancel those that they stand in for; what earlier periods leave comes
+in any phase. Of many pairs of jumps squares add.
 """
 
 from __future__ import annotations
@@ -42,6 +47,8 @@ _PARTS, _REACH, _RATIO, _ABOVE = 8, 6, 1.25, 4.0
 _FREER = 30.0
 #: over which share of a frequency D is averaged
 _AVERAGED = 0.1
+#: how far eigenvalues of a block are moved apart, relative to their sizes, where they are the same
+_SPLIT = 1e-7
 
 
 class Poles(NamedTuple):
@@ -64,9 +71,9 @@ class LeftOut(NamedTuple):
 
     slow
         How many blocks it does not leave out.
-    turns, decays, speeds
-        Largest imaginary and real parts and moduli of the eigenvalues of those that it does, and of those that stand in
-        for them, (B,).
+    turns, decays
+        Largest imaginary and real parts of the eigenvalues of those that it does, and of those that stand in for them,
+        (B,).
     couples
         How far forces drive each of these, and how much channels read of it and of its rate, (B, 3, G).
     unit
@@ -74,16 +81,18 @@ class LeftOut(NamedTuple):
     own, sizes, rates
         The diagonal of D there, (nodes, G), |D| without it, and |D'|, (nodes, G, G).
     tails
-        Sizes of the integrals from there on of `Re D d Omega / Omega^2`, `2 Im D d Omega / Omega^3`, and with |D'| as
-        the first, (3, nodes, G, G).
+        Integrals from there on of `Re D d Omega / Omega^2`, `2 Im D d Omega / Omega^3`, and with |D'| as the first, (3,
+        nodes, G, G).
     average
         The largest entry of |D|, its mean from there on by `d Omega / Omega^2`, (nodes,).
+    exponents, leaving
+        Those of free vibrations, of two that are conjugate one, (K,), and the residues of D and of the same of rates
+        there, by squares of the exponents, (2, G, G, K); of conjugate ones the sum is the real part.
     """
 
     slow: int
     turns: Array
     decays: Array
-    speeds: Array
     couples: Array
     unit: float
     own: ComplexArray
@@ -91,6 +100,8 @@ class LeftOut(NamedTuple):
     rates: Array
     tails: Array
     average: Array
+    exponents: ComplexArray
+    leaving: ComplexArray
 
 
 def left_out(blocks: Blocks, slow: int, few: States, exponents: ComplexArray, flexible: Array) -> LeftOut:
@@ -103,9 +114,7 @@ def left_out(blocks: Blocks, slow: int, few: States, exponents: ComplexArray, fl
     driven, read = (np.concatenate(pair) for pair in (
         (blocks.driven[states], few.driven), (blocks.read[:, :, states].T, few.read.T)
     ))  # fmt: skip
-    turns, decays, speeds = (
-        of_blocks(np.maximum, part, ends) for part in (np.abs(values.imag), values.real, np.abs(values))
-    )
+    turns, decays = (of_blocks(np.maximum, part, ends) for part in (np.abs(values.imag), values.real))
     # of two conjugate states each has half
     drives = np.sqrt(of_blocks(np.add, driven**2, ends)) / np.diff(ends)[:, None]
     reads = np.sqrt(of_blocks(np.add, read**2, ends)).transpose(0, 2, 1)
@@ -127,13 +136,33 @@ def left_out(blocks: Blocks, slow: int, few: States, exponents: ComplexArray, fl
         by_square, by_cube = ((1.0 - upto**power) / w**power for power in (1, 2))
     by_square[0] = by_cube[0] = 0.0
     parts = np.stack((by_square * missing[:, 0].real.T, by_cube * missing[:, 0].imag.T, by_square * rates.T))
-    tails = np.abs(parts[..., ::-1].cumsum(axis=-1)[..., ::-1]).transpose(0, 3, 2, 1)
+    tails = parts[..., ::-1].cumsum(axis=-1)[..., ::-1].transpose(0, 3, 2, 1)
     average = w * (by_square * sizes.max(axis=(1, 2)))[::-1].cumsum()[::-1]
     np.einsum("wgg->wg", sizes)[:] = 0.0
     return LeftOut(
-        slow, turns, decays, speeds, couples, unit, np.ascontiguousarray(own[:nodes]), sizes[:nodes], rates[:nodes],
-        np.ascontiguousarray(tails[:, :nodes]), average[:nodes],
+        slow, turns, decays, couples, unit, np.ascontiguousarray(own[:nodes]), sizes[:nodes], rates[:nodes],
+        np.ascontiguousarray(tails[:, :nodes]), average[:nodes], *_leaving(ends, values, coupling, flexible.shape),
     )  # fmt: skip
+
+
+def _leaving(
+    ends: np.ndarray, values: ComplexArray, coupling: Array, shape: tuple[int, ...]
+) -> tuple[ComplexArray, ComplexArray]:
+    """`LeftOut.exponents` and `leaving` of blocks."""
+    one, other = values[ends[:-1]], values[ends[1:] - 1]
+    other = np.where(np.abs(one - other) > _SPLIT * np.abs(one), other, one * (1.0 - _SPLIT))
+    own, turned = coupling.transpose(1, 2, 0)
+    leaving = np.concatenate(
+        (
+            (turned - other * own) / ((one - other) * one**2),
+            (one * own - turned) / ((one - other) * other**2),
+        ),
+        axis=1,
+    )
+    exponents = np.concatenate((one, other))
+    leaving[:, exponents.imag > 0.0] *= 2.0
+    kept = exponents.imag >= 0.0
+    return exponents[kept], leaving[:, kept].reshape(2, *shape, -1)
 
 
 def _responses(
@@ -147,6 +176,17 @@ def _responses(
     own, turned = coupling.transpose(1, 0, 2)
     result: ComplexArray = (trace / (near * far)) @ own + (double / (near * far)) @ turned
     return result
+
+
+class Jumps(NamedTuple):
+    """Jumps of stiffness and damping along a motion that are known.
+
+    at, channel
+        Their phases, in the order of time, and which of the channels that act, (E,).
+    """
+
+    at: Array
+    channel: np.ndarray
 
 
 class Motions(NamedTuple):
@@ -275,10 +315,8 @@ def _coupled(couples, b, force, back, i, n):
 
 
 @kernel(fastmath=_FAST, error_model="numpy")
-def _repelled(known, i, missing, rate, last, waits):
-    """How far blocks that are left out move the motion i at resonance, by coefficients that are known, and by what
-    jumps leave of it until the next ones.
-    """
+def _repelled(known, i, missing, rate):
+    """How far blocks that are left out move the motion i at resonance, by coefficients that are known."""
     lines, nu, decay, total = known.force.shape[1], abs(known.exponents[i].imag), known.exponents[i].real, 0.0
     for b in range(missing.turns.shape[0]):
         turn, apart = missing.turns[b], missing.decays[b] - decay
@@ -294,14 +332,6 @@ def _repelled(known, i, missing, rate, last, waits):
                         nearer = math.sqrt(square) + coupled / math.sqrt(square + coupled)
                         nearer *= coupled / (square + coupled)
                         total += max(0.0, nearer - coupled / (_AVERAGED * turn))
-        size = missing.speeds[b]
-        coupled = _coupled(missing.couples, b, known.jumping, known.struck, i, 0) if size > last else 0.0
-        if coupled > 0.0:
-            width = math.sqrt(apart * apart + coupled * rate * rate / (size * size))
-            echoes = 1.0 / math.expm1(min(width * 2.0 * math.pi / rate, 50.0))
-            for time in waits:
-                echoes += math.exp(-width * time) / waits.shape[0]
-            total += 4.0 * math.pi * rate * coupled / (size * size) * echoes
     return total
 
 
@@ -325,29 +355,80 @@ def _answered(missing, frequency, force, back, damped):
 
 
 @kernel(fastmath=_FAST, error_model="numpy")
-def _by_jumps(missing, last, nu, force, back):
-    """The same by all coefficients behind the frequency `last`, as those of a jump, of a motion of the frequency nu."""
-    nodes, groups, total = missing.average.shape[0], force.shape[0], 0.0
+def _echoes(missing, rate, last, jumps):
+    """How much of a jump of each channel, that drives, those of each, that reads, meet in free vibrations faster than
+    `last`, of displacements and rates, (2, G, G), where the jumps of a channel are alike; of channels whose jumps are
+    not known no more than |D| tells. See `moved_without`.
+    """
+    count, groups, states = jumps.at.shape[0], missing.own.shape[1], missing.exponents.shape[0]
+    squares, share = np.zeros((2, groups, groups)), np.zeros(groups)
+    for i in range(count):
+        share[jumps.channel[i]] += 1.0
+    free, now = np.zeros((count, states), dtype=np.complex128), np.empty(states, dtype=np.complex128)
+    for k in range(states):
+        s = missing.exponents[k]
+        if abs(s) > last:
+            for i in range(count):
+                free[i, k] = np.exp(s * ((jumps.at[(i + 1) % count] - jumps.at[i]) % (2.0 * math.pi)) / rate)
+            before = math.exp(s.real * 2.0 * math.pi / rate)
+            before = (before / max(1.0 - before, _TINY)) ** 2
+            for part in range(2):
+                for g in range(groups):
+                    for h in range(groups):
+                        c = missing.leaving[part, g, h, k]
+                        squares[part, g, h] += before * (c.real * c.real + c.imag * c.imag)
+    for i in range(count):
+        h = jumps.channel[i]
+        now[:] = 1.0
+        for step in range(1, count):
+            j = (i + step) % count
+            g = jumps.channel[j]
+            for k in range(states):
+                now[k] *= free[(j - 1) % count, k]
+            for part in range(2):
+                met = 0.0
+                for k in range(states):
+                    c = missing.leaving[part, g, h, k]
+                    met += c.real * now[k].real - c.imag * now[k].imag
+                squares[part, g, h] += met * met / (share[g] * share[h])
+    anywhere = missing.average[min(int(last / missing.unit), missing.average.shape[0] - 1)] / (last * math.pi)
+    for g in range(groups):
+        for h in range(groups):
+            if share[g] == 0.0 or share[h] == 0.0:
+                squares[:, g, h] = anywhere * anywhere
+    return math.pi * np.sqrt(squares)
+
+
+@kernel(fastmath=_FAST, error_model="numpy")
+def _by_jumps(missing, echoes, last, nu, force, back):
+    """The same by all coefficients behind the frequency `last`, as those of jumps, of a motion of the frequency nu."""
+    nodes, groups, own, rest, squares = missing.average.shape[0], force.shape[0], 0.0j, 0.0, 0.0
     where = min(last / missing.unit, nodes - 1.0)
     j = min(int(where), nodes - 2)
     low, high = j + 1.0 - where, where - j
     for g in range(groups):
         for h in range(groups):
             before, after = missing.tails[:, j, g, h], missing.tails[:, j + 1, g, h]
-            by = low * (before[0] + nu * before[1]) + high * (after[0] + nu * after[1])
-            total += (back[0, g] * by + back[1, g] * (low * before[2] + high * after[2])) * force[h]
-    return total
+            by = complex(low * before[0] + high * after[0], nu * (low * before[1] + high * after[1]))
+            if g == h:
+                own += back[0, g] * by * force[h]
+            else:
+                rest += back[0, g] * abs(by) * force[h]
+            rest += back[1, g] * (low * before[2] + high * after[2]) * force[h]
+            squares += ((back[0, g] * echoes[0, g, h] + back[1, g] * echoes[1, g, h]) * force[h]) ** 2
+    return own, rest + math.sqrt(squares)
 
 
 @kernel(fastmath=_FAST, error_model="numpy")
-def moved_without(known, rate, last, waits, missing, most, shifts):
+def moved_without(known, rate, last, jumps, missing, most, shifts):
     """How far what is left out moves multipliers, those that have decayed counting less, or more than `most`; how far
     it moves the exponents of all slow motions within a period into shifts (B,).
 
-    known: see `Motions`; rate: omega; last: the frequency behind that of the last coefficient that is known; waits:
-    times between jumps; missing: see `LeftOut`.
+    known: see `Motions`; rate: omega; last: the frequency behind that of the last coefficient that is known; jumps: see
+    `Jumps`; missing: see `LeftOut`.
     """
     worst = largest = 0.0
+    echoes = _echoes(missing, rate, last, jumps) if known.jumps else np.zeros((0, 0, 0))
     for i in range(missing.slow):
         shifts[i] = largest
         if not known.left[i] > _GONE:
@@ -362,10 +443,11 @@ def moved_without(known, rate, last, waits, missing, most, shifts):
                 answer, rest = _answered(missing, at, known.force[i, n], known.back[i, n], known.damped)
                 own += answer
                 shift += rest
-        shift += _repelled(known, i, missing, rate, last, waits) + abs(own)
         if known.jumps:
-            shift += 2.0 * rate * _by_jumps(missing, last, nu, known.jumping[i, 0], known.struck[i, 0])
-        shifts[i] = shift * 2.0 * math.pi / rate
+            answer, rest = _by_jumps(missing, echoes, last, nu, known.jumping[i, 0], known.struck[i, 0])
+            own += 2.0 * rate * answer
+            shift += 2.0 * rate * rest
+        shifts[i] = (shift + _repelled(known, i, missing, rate) + abs(own)) * 2.0 * math.pi / rate
         largest = max(largest, shifts[i])
         far = 1.0 + _FREER * (1.0 - known.left[i])
         worst = max(worst, known.left[i] * math.expm1(min(shifts[i], 1.0)) / far)
@@ -375,25 +457,30 @@ def moved_without(known, rate, last, waits, missing, most, shifts):
 
 
 @kernel()
-def of_the_rest(exponents, shifting, first, rates, yielding, means, held, without, rate, rounding):
-    """Multipliers of the blocks' states that are not followed, `without` (S,), as if channels had their mean stiffness
-    and damping, and how far these may move them.
+def of_the_rest(exponents, shifting, first, rates, yielding, active, tangents, held, followed, rate, rounding):
+    """Multipliers of the blocks' states that are not `followed`, as if channels had their mean stiffness and damping,
+    and how far these may move them.
 
-    exponents, shifting, first, rates, yielding: see `blocks.Blocks`; means, held (2, G): means, and integrals of the
-    sizes, of stiffness and damping; rate: omega; rounding: relative error by it.
+    exponents, shifting, first, rates, yielding, active: see `blocks.Blocks`; tangents (2, C, .): Fourier coefficients
+    of stiffness and damping; held (2, G): integrals of their sizes; rate: omega; rounding: relative error by it.
     """
     mu, errors, count = np.empty(exponents.shape[0], dtype=np.complex128), np.empty(exponents.shape[0]), 0
+    rest = np.ones(exponents.shape[0], dtype=np.bool_)
+    rest[followed] = False
     for b in range(rates.shape[0]):
         forces = 0.0
         for g in range(held.shape[1]):
             forces += yielding[b, g] * (held[0, g] + rates[b] * held[1, g])
         moved = math.expm1(min(2.0 * rates[b] * forces, 1.0)) + rounding
         for s in range(first[b], first[b + 1]):
-            if not without[s]:
+            if not rest[s]:
                 continue
             exponent = exponents[s]
             for g in range(held.shape[1]):
-                exponent += shifting[0, s, g] * means[0, g] + shifting[1, s, g] * means[1, g]
+                exponent += (
+                    shifting[0, s, g] * tangents[0, active[g], 0].real
+                    + shifting[1, s, g] * tangents[1, active[g], 0].real
+                )
             exponent *= 2.0 * math.pi / rate
             mu[count] = np.exp(exponent)
             errors[count] = abs(mu[count]) * (moved + 1e-15 * abs(exponent)) + _NOTHING

@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from suboctave.floquet.blocks import Blocks, States, in_blocks, in_one, of_blocks, separated, states_of
-from suboctave.floquet.left_out import LeftOut, Motions, left_out, moved_without
+from suboctave.floquet.left_out import Jumps, LeftOut, Motions, left_out, moved_without
 from suboctave.harmonic.aft.channel import Group
 from suboctave.harmonic.basis import Array
 from suboctave.harmonic.linear_part import LinearPart
@@ -86,7 +86,7 @@ class Along(NamedTuple):
     known: Motions
     rate: float
     last: float
-    waits: Array
+    jumps: Jumps
 
 
 class Choice(NamedTuple):
@@ -105,7 +105,8 @@ class Levels:
     def __init__(self, blocks: Blocks) -> None:
         self.blocks = blocks
         self.whole = Choice(_level(blocks, blocks.coupled), 0.0, np.zeros(blocks.coupled))
-        self._cuts = list(range(0, blocks.coupled, max(1, blocks.coupled // _CUTS)))
+        self._cuts = np.arange(0, blocks.coupled, max(1, blocks.coupled // _CUTS))
+        self._first, self._rates = blocks.first[self._cuts], blocks.rates[self._cuts]
         self._made: dict[tuple[int, int], Level | None] = {}
 
     def of(self, slow: int, order: int) -> Level | None:
@@ -131,13 +132,14 @@ class Levels:
         with rates up to `resolved` have states.
         """
         least, count = self.whole, 2 * len(self.blocks.active)
-        cuts = [cut for cut in self._cuts if self.blocks.rates[cut] > resolved]
+        resolving = int(np.searchsorted(self._rates, resolved, side="right"))
         for order in _ORDERS:
             # the more slow blocks there are, the less is left out
-            low, high = 0, sum(int(self.blocks.first[cut]) + count * order < least.level.states for cut in cuts)
+            low, high = resolving, int(np.searchsorted(self._first, least.level.states - count * order))
             while low < high:
-                middle = (low + high) // 2
-                choice = self._tried(along, cuts[middle], order, tolerable)
+                # beside one that serves another seldom does with fewer states
+                middle = (low + high) // 2 if order == _ORDERS[0] else high - 1
+                choice = self._tried(along, int(self._cuts[middle]), order, tolerable)
                 if choice is None:
                     low = middle + 1
                 else:

@@ -50,7 +50,7 @@ from scipy.linalg import lapack
 from suboctave.floquet.channels import BLIND, Channels
 from suboctave.floquet.exponentials import TURNS, structure
 from suboctave.floquet.forms import form_of, forms_along
-from suboctave.floquet.left_out import beyond, motions, of_the_rest, poles
+from suboctave.floquet.left_out import Jumps, beyond, motions, of_the_rest, poles
 from suboctave.floquet.levels import Along, levels_of
 from suboctave.floquet.propagate import closed, march, multipliers_and_shifts, response, without_nearest
 from suboctave.floquet.resolution import ACCURACY, divided, longest_rest, stretches, tolerated
@@ -83,8 +83,6 @@ _LENGTHS = (1.2, 1.8, TURNS, 1.0 / 12.0)
 _FORGOTTEN = math.log(1e-14)
 #: how often panels are made shorter, as what is seen between their nodes needs it
 _DIVIDED = 6
-#: phase up to which jumps happen at once, and between jumps where it is not known when they are
-_AT_ONCE, _BLINDLY = 1e-2, 0.3
 _TINY = float(np.finfo(float).tiny)
 _NO_PASSAGES = np.zeros((2, 0))
 _NO_MULTIPLIERS = np.empty(0, dtype=complex), np.empty(0)
@@ -173,11 +171,13 @@ class _Linearised:
         """What tells which blocks need states."""
         state, blocks = self.state, self._blocks
         known = motions(state.tangent_spectra, blocks.active, state.rate, poles(blocks), blocks.coupled)
-        # between jumps of stiffness that follow one another; what happens at once is one
-        at = self.events[np.isinf(self.events[:, 1]), 0]
-        after = np.diff(at, append=at[:1] + 2.0 * math.pi)
-        waits = np.append(after[after > _AT_ONCE], _BLINDLY) if self._kinked else after[after > _AT_ONCE]
-        return Along(known, state.rate, (state.tangent_spectra.shape[2] - 0.5) * state.rate, waits / state.rate)
+        which = np.full(len(self._motions), -1)
+        which[self.active] = np.arange(len(self.active))
+        # where jumps may be anywhere none is known
+        at = self.events[np.isinf(self.events[:, 1])] if not self._kinked else self.events[:0]
+        channel = which[self._laws.owner[at[:, 5].astype(int)]]
+        last = (state.tangent_spectra.shape[2] - 0.5) * state.rate
+        return Along(known, state.rate, last, Jumps(at[channel >= 0, 0], channel[channel >= 0]))
 
     def _propagate(self, rest: float) -> None:
         """Perturbations over the period along the motion as it stands, and where the periodic response begins; no
@@ -276,12 +276,9 @@ class _Linearised:
         blocks = self._blocks
         if self.own == len(blocks.exponents):
             return _NO_MULTIPLIERS
-        without = np.ones(len(blocks.exponents), dtype=bool)
-        without[self._kept[: self.own]] = False
-        means = self.state.tangent_spectra[:, blocks.active, 0].real
         return of_the_rest(
-            blocks.exponents, blocks.shifting, blocks.first, blocks.rates, blocks.yielding, means, self._held, without,
-            self.state.rate, self.rounding,
+            blocks.exponents, blocks.shifting, blocks.first, blocks.rates, blocks.yielding, blocks.active,
+            self.state.tangent_spectra, self._held, self._kept[: self.own], self.state.rate, self.rounding,
         )  # fmt: skip
 
     def _still(self) -> Array:
@@ -306,7 +303,7 @@ class _Linearised:
             if not self.state.driven:
                 start = self._still()
             elif weight < 1.0:
-                start = start - (1.0 - weight) * (projector(self.before) @ start)
+                start = start - (1.0 - weight) * (projector(self.before, self._all_standing) @ start)
             excess = response(
                 self._structures, self._stretch, self._forms, self.active, self._acting, self._solved, self._begins,
                 start, self._whole, self._kept, self.path, _LARGEST, change,
@@ -431,12 +428,12 @@ def _beside_fold(motion: _Linearised, gap: float, moved: float) -> tuple[Complex
     return mu, shift, share
 
 
-def projector(phi: Array) -> Array:
-    """On the invariant subspace of the multipliers nearest to +1, one or several that lie together, (N, N).
+def projector(phi: Array, mu: ComplexArray) -> Array:
+    """On the invariant subspace of the multipliers nearest to +1, one or several that lie together, (N, N); mu (N,):
+    all of them.
 
     With `phi = Q [[A, X], [0, B]] Q^T`, A with these multipliers, it is `Q [[1, R], [0, 0]] Q^T`, `A R - R B = X`.
     """
-    mu = np.linalg.eigvals(phi)
     reach = _TOGETHER * float(np.abs(1.0 - mu).min())
     schur, q, count = scipy.linalg.schur(phi, sort=lambda re, im: math.hypot(1.0 - re, im) <= reach)
     inside, coupling, outside = schur[:count, :count], schur[:count, count:], schur[count:, count:]

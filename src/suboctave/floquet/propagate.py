@@ -363,37 +363,38 @@ def multipliers_and_shifts(real, imaginary, left, right, phi, before, own, missi
             change += (phi[i, j] - before[i, j]) ** 2
             norm += phi[i, j] ** 2
     # a double multiplier moves like the square root of a perturbation: that bounds the first-order estimate
-    most = math.sqrt((math.sqrt(change) + _ROUNDING * math.sqrt(norm)) * largest)
-    unknown = doubt * math.sqrt(change)
-    v, turned, length = np.empty(size), np.zeros(size), np.empty(size)
+    change, norm = math.sqrt(change), math.sqrt(norm)
+    most = math.sqrt((change + _ROUNDING * norm) * largest)
+    unknown = doubt * change
+    v, turned = np.empty(size), np.zeros(size)
     for j in range(size):
         if imaginary[j] < 0.0:
             moved[0, j], moved[1, j] = moved[0, j - 1], moved[1, j - 1]
             continue
         more = j + 1 if imaginary[j] > 0.0 else j
         turn = 0.0 if more == j else 1.0
+        by_change = scale = 0.0j
+        lefts = rights = ahead = behind = 0.0
         for q in range(size):
             v[q], turned[q] = right[q, j], turn * right[q, more]
-            length[q] = math.hypot(v[q], turned[q]) if turn != 0.0 else abs(v[q])
-        by_change = scale = 0.0j
-        by_rounding = 0.0
         for i in range(size):
-            x = y = rounded = 0.0
+            x = y = 0.0
             for q in range(size):
                 d = phi[i, q] - before[i, q]
                 x += d * v[q]
                 y += d * turned[q]
-                rounded += abs(phi[i, q]) * length[q]
             u = complex(left[i, j], -turn * left[i, more])
             scale += u * complex(v[i], turned[i])
             by_change += u * complex(x, y)
-            by_rounding += abs(u) * rounded
-        first = (abs(by_change) + _ROUNDING * by_rounding) / abs(scale) if abs(scale) > 0.0 else np.inf
+            forwards, backwards = u.real**2 + u.imag**2, v[i] ** 2 + turned[i] ** 2
+            lefts += forwards
+            rights += backwards
+            if i < own:
+                ahead += forwards * missing[0, i] ** 2
+                behind += backwards * missing[1, i] ** 2
+        by_rounding = _ROUNDING * norm * math.sqrt(lefts * rights)
+        first = (abs(by_change) + by_rounding) / abs(scale) if abs(scale) > 0.0 else np.inf
         moved[0, j] = min(first, most) + 1e-14
-        ahead = behind = 0.0
-        for i in range(own):
-            ahead += (abs(complex(left[i, j], turn * left[i, more])) * missing[0, i]) ** 2
-            behind += (length[i] * missing[1, i]) ** 2
         by_missing = unknown + abs(mu[j]) * math.sqrt(ahead * behind)
         furthest = math.sqrt(by_missing * largest)
         moved[1, j] = min(by_missing / abs(scale), furthest) if abs(scale) > 0.0 else furthest

@@ -23,6 +23,8 @@ _MOST = 100_000_000
 _MOST_SHOWN = 4
 #: DOFs up to which the stiffness is examined for motions that nothing holds
 _MOST_EXAMINED = 400
+#: condition of a stiffness that holds all motions beyond doubt
+_HELD = 1e9
 
 
 def check_is_system(system: Any) -> None:
@@ -57,6 +59,8 @@ def _check_held(system: System) -> None:
         scaled = stiffness * scale[:, None] * scale
     if not np.isfinite(scaled).all():
         raise InputError("the stiffness over the mass is larger than any number: check the units of both")
+    if np.linalg.cond(scaled, 1) < _HELD:
+        return
     _, sizes, vectors = np.linalg.svd(scaled)
     free = vectors[sizes <= 1e-13 * max(sizes[0], np.finfo(float).tiny)]
     if not len(free):
