@@ -137,9 +137,16 @@ class Case:
 
 
 @pytest.fixture(scope="module", params=[(1, "whole"), (2, "whole"), (1, "condensed")], ids=str)
-def case(request, elements):
+def made(request, elements):
     nu, form = request.param
     return Case(elements, nu, form == "condensed")
+
+
+@pytest.fixture
+def case(made):
+    """With the same random vectors whatever ran before."""
+    made.random = np.random.default_rng(1)
+    return made
 
 
 def difference(function, step=STEP):

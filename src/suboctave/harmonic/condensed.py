@@ -30,7 +30,7 @@ from scipy.linalg import eigh
 
 from suboctave.errors import ConvergenceError, InputError, shortened
 from suboctave.harmonic.basis import Array, ComplexArray
-from suboctave.harmonic.elimination import Stack
+from suboctave.harmonic.elimination import Stack, States, states_of
 from suboctave.harmonic.linear_part import (
     LinearPart,
     StructuralMatrices,
@@ -166,20 +166,30 @@ class Condensed:
         squares, turn = eigh((null * values[:, None]).T @ null) if null.shape[1] else (np.zeros(0), np.zeros((0, 0)))
         return Coordinates(static, modes @ (null @ turn), squares, unit, held)
 
-    def _split(self, matrices: Array) -> list[tuple[Array, ...]]:
-        """Matrices (., r, r) in the coordinates (q, z), each as qq, qz, zq, zz, with nothing in the loads' columns."""
-        left = np.concatenate((self._coordinates.static, self._coordinates.free), axis=1).T
+    @lazy
+    def _states(self) -> States | None:
+        """Those of the vibrations, where they are coordinates in their place."""
+        _, damping, stiffness, structural = self._vibrating
+        return None if structural[3].any() else states_of(damping[3], stiffness[3])
+
+    def _split(self, matrices: Array, states: States | None = None) -> list[tuple[NDArray[Any], ...]]:
+        """Matrices (., r, r) in the coordinates (q, z), or states for z, each as qq, qz, zq, zz, with nothing in the
+        loads' columns.
+        """
+        static, free = self._coordinates.static, self._coordinates.free
+        right = np.concatenate((static, free if states is None else free @ states.columns), axis=1)
+        left = np.concatenate((static, free if states is None else free @ states.rows.T), axis=1).T
         m, none = self.size, np.zeros((len(left), len(self._loads)))
-        parts: list[tuple[Array, ...]] = []
+        parts: list[tuple[NDArray[Any], ...]] = []
         for matrix in matrices:
-            whole = left @ matrix @ left.T
+            whole = left @ matrix @ right
             beside = np.concatenate((whole[:, :m], none), axis=1)
             parts.append((beside[:m], whole[:m, m:], beside[m:], whole[m:, m:]))
         return parts
 
     @lazy
-    def _own(self) -> Stack:
-        """M, C, K, S in the coordinates (q, z)."""
+    def _vibrating(self) -> list[tuple[Array, ...]]:
+        """M, C, K, S in the coordinates (q, z), see `_split`."""
         static, free, squares, unit, held = self._coordinates
         m, k = self.size, self._matrices[2]
         mass, damping, skew, structural = self._split(
@@ -191,7 +201,19 @@ class Condensed:
         # loads act at all frequencies alike
         qq[:, m:], zq[:, m:] = static.T @ self._loads.T, free.T @ self._loads.T
         stiffness = qq, qz, zq, np.diag(squares) + skew[3]
-        return Stack.of([(*mass[:3], np.eye(len(squares))), damping, stiffness, structural])
+        return [(*mass[:3], np.eye(len(squares))), damping, stiffness, structural]
+
+    @lazy
+    def _own(self) -> Stack:
+        """The same, with states for z where these are better."""
+        parts, states = self._vibrating, self._states
+        if states is None:
+            return Stack.of(parts)
+        none = np.zeros((len(states.exponents), len(states.exponents)))
+        inner = none, np.eye(len(none)), np.diag(-states.exponents), none
+        return Stack.of(
+            [(qq, qz @ states.columns, states.rows @ zq, zz) for (qq, qz, zq, _), zz in zip(parts, inner, strict=True)]
+        )
 
     # ------------------------------------------------------------------------------------------------------- blocks
     def _stack(self, names: tuple[str, ...]) -> Stack | None:
@@ -199,7 +221,7 @@ class Condensed:
         if not names:
             return self._own
         parts = differentiated(self.projected.matrices, names, self.values)
-        return None if parts is None else Stack.of(self._split(parts))
+        return None if parts is None else Stack.of(self._split(parts, self._states))
 
     def _eliminated(self, frequency: NDArray[Any]) -> tuple[ComplexArray, ComplexArray, dict[Any, Any]]:
         """`Z_zz^-1 Z_zq` at frequencies, the transpose of `Z_qz Z_zz^-1`, and what is known there of A and its
@@ -242,12 +264,13 @@ class Condensed:
 
     def fed(self, rate: float) -> Condensed:
         """See `LinearPart.fed`; the coordinates are those of this part."""
-        whole = self._own
+        whole = Stack.of(self._vibrating)
         other = copy.copy(self)
         other._last = other._other = other._wider = None
         other._matrices = fed_matrices(self._matrices, rate)
-        vars(other).pop("_equation", None)
-        vars(other)["_own"] = whole._replace(entries=fed_matrices(whole.entries, rate))
+        for made in ("_equation", "_vibrating", "_feeding"):
+            vars(other).pop(made, None)
+        vars(other)["_states"], vars(other)["_own"] = None, whole._replace(entries=fed_matrices(whole.entries, rate))
         return other
 
     def feeding(self, frequency: Array) -> ComplexArray:
@@ -257,7 +280,7 @@ class Condensed:
 
     @lazy
     def _feeding(self) -> Stack:
-        return self._own._replace(entries=feeding_matrices(self._own.entries))
+        return Stack.of(self._split(feeding_matrices(self._matrices), self._states))
 
     def _unknowns_alone(self, whole: ComplexArray) -> ComplexArray:
         """Without the loads' columns."""
@@ -327,12 +350,13 @@ class Condensed:
     def recovered(self, frequency: Array, amplitudes: ComplexArray, loads: ComplexArray | None = None) -> ComplexArray:
         """See `LinearPart.recovered`."""
         static, free = self._coordinates.static, self._coordinates.free
+        shapes = free if self._states is None else free @ self._states.columns
         columns = amplitudes
         if len(self._loads):
             none = np.zeros((len(amplitudes), len(self._loads)))
             columns = np.concatenate((amplitudes, none if loads is None else -loads), axis=1)
         inner = (self._eliminated(frequency)[0] @ columns[:, :, None])[:, :, 0]
-        result: ComplexArray = amplitudes @ static.T - inner @ free.T
+        result: ComplexArray = amplitudes @ static.T - inner @ shapes.T
         return result
 
 

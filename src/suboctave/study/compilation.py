@@ -42,7 +42,7 @@ def _stability() -> None:
 def _responses() -> None:
     """Exact and rounded contact: period doubling and fold, their curves, the doubled motion; a structure with unknowns
     at its stop only, one vibration of which decays between contacts, and one of which three more are faster than
-    its harmonics.
+    its harmonics and coupled by damping.
     """
     system = library.reference_oscillator()
     doubling = frequency_response(system, (4.05, 3.9)).bifurcations[0]
@@ -54,7 +54,7 @@ def _responses() -> None:
     for fast in ((), (4e2, 9e2, 2e3)):
         n = 2 + len(fast)
         stiffness = np.diag([2.0, 2.0, *fast]) - np.eye(n, k=1) - np.eye(n, k=-1)
-        damping = np.diag([0.1, 8.0, *(1.0 for _ in fast)])
+        damping = np.diag([0.1, 8.0, *(1.0 for _ in fast)]) - 0.1 * np.eye(n, k=1) - 0.1 * np.eye(n, k=-1)
         structure = System(np.eye(n), damping, stiffness, [ElasticStop(0, 5.0, 0.3)], [HarmonicLoad(0, 1.0)])
         motion = frequency_response(structure, (1.0, 1.02), harmonics=9).orbits[0]
         # as normal forms ask for it
