@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from suboctave.continuation import CurvePoint, Event, March, NewtonOptions, SteppingOptions
+from suboctave.continuation import CurvePoint, Event, March, NewtonOptions, SteppingOptions, events
 from suboctave.continuation.ending import EndReason
 from suboctave.continuation.events import Bracket
 from suboctave.continuation.linear import Factor
@@ -267,6 +267,26 @@ def test_a_zero_along_the_curve():
     assert a.arclength < zero.arclength < b.arclength
     assert located(a, b, (0.0, 1.0), height) is a
     assert located(a, b, (1.0, 0.0), height) is b
+
+
+@pytest.mark.parametrize("astray", [1, 4])
+def test_a_point_of_another_curve_is_no_point_between(astray, monkeypatch):
+    """Two lines, x = 0 and x = 9: what Newton's method finds on the second is not taken for the first."""
+    lines = Plane(lambda x, p: x * (x - 9.0), lambda x, p: (2.0 * x - 9.0, 0.0))
+    a, b = start(lines, 0.0, 0.0), start(lines, 0.0, 1.0)
+    calls = []
+
+    def led_astray(curve, guess, *arguments):
+        calls.append(guess)
+        return correct(curve, guess + (9.0, 0.0) if len(calls) <= astray else guess, *arguments)
+
+    monkeypatch.setattr(events, "correct", led_astray)
+    bracket = Bracket(a, b, (-0.25, 0.75), lambda point: point.u[1] - 0.25, NEWTON)
+    if astray == 4:
+        with pytest.raises(ConvergenceError, match="left the curve"):
+            bracket.zero()
+    else:
+        assert bracket.points[bracket.zero()].u == pytest.approx([0.0, 0.25])
 
 
 @pytest.mark.parametrize("power", [1, 3, 9])

@@ -16,6 +16,8 @@ from suboctave.continuation.point import CurvePoint, between, make_point
 from suboctave.continuation.problem import Array
 from suboctave.errors import ConvergenceError, InputError
 
+#: distance from the chord between two neighbours, in units of its length, from which on a point is on another curve
+_ELSEWHERE = 2.0
 #: ratio of a function's values at two ends beyond which it does not change evenly
 _LARGE = 30.0
 
@@ -61,7 +63,7 @@ class Bracket:
         if size == 0.0:
             raise ConvergenceError(f"two points fall together at {b.curve.where(b.u)}")
         self._row = (scaled - origin) / size
-        self._places = float(self._row @ origin), float(self._row @ scaled)
+        self._places, self._ends = (float(self._row @ origin), float(self._row @ scaled)), (origin, scaled)
 
     @property
     def way(self) -> float:
@@ -99,9 +101,14 @@ class Bracket:
             missing = place - float(self._row @ (weights * u))
             guess = u + missing / float(self._row @ (weights * along)) * along
             try:
-                return make_point(correct(curve, guess, self._row, weights, options), curve, ahead, arclength)
+                solved = correct(curve, guess, self._row, weights, options)
             except ConvergenceError as error:
                 failure = error
+                continue
+            off = length(weights * solved.u - (1.0 - share) * self._ends[0] - share * self._ends[1])
+            if off <= _ELSEWHERE * (end - start):
+                return make_point(solved, curve, ahead, arclength)
+            failure = ConvergenceError(f"Newton's method left the curve for {curve.where(solved.u)}")
         raise failure
 
     def zero(self, resolved: float = 1e-12) -> float:
