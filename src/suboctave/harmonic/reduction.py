@@ -12,6 +12,9 @@ other damping, or other values of parameters in the matrices, find what they nee
 serves all of it; the shift makes it one of a definite matrix for free bodies too. In exact arithmetic the error of G
 is `R^T Z^-1 R`, of second order in the residual where the matrices are symmetric, and is estimated by `R^T (K + s^2
 M)^-1 R`.
+
+A basis that serves at two values of the parameters that are not far apart serves between them: the error vanishes at
+both. So where a curve leaves the values that are known, a basis grows at one ahead of it.
 """
 
 from __future__ import annotations
@@ -20,6 +23,8 @@ import copy
 import math
 import weakref
 from collections.abc import Callable, Mapping
+from functools import partial
+from itertools import combinations_with_replacement
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -49,8 +54,10 @@ _SETTLED, _COMPARED = 1e-7, 96
 _WRONG = 1e-3
 #: most vectors of a basis; for how many there is room at first
 _MOST, _ROOM = 600, 40
-#: relative change of an expression in a matrix that a basis is trusted over without a test
-_TRUSTED = 0.05
+#: distance of two values of every expression in a matrix, relative, up to which what serves at both serves between
+_NEAR = 1.0 / 3.0
+#: how many times the way to a value of the parameters a basis may grow ahead of it, and steps to there
+_AHEAD, _STEP = 100.0, 1.5
 
 
 class Projected(NamedTuple):
@@ -72,6 +79,14 @@ class Projected(NamedTuple):
     covers: float
 
 
+class _Tested(NamedTuple):
+    """Expressions in the matrices, the highest frequency, and values of the parameters, where a basis was tested."""
+
+    at: Array
+    covers: float
+    values: Mapping[str, float]
+
+
 class Reduction:
     """A structure in a basis that is grown for the directions (m, n) that its unknowns are displacements along, and
     those of other loads, (l, n); larger ones grow from it.
@@ -80,9 +95,6 @@ class Reduction:
     scale: a frequency within the range of interest; projected: the structure in the basis. Made by `of` and `covering`:
     what one curve asks for does not change what others have, and what several ask for is made once.
     """
-
-    #: values of the parameters that it was made at
-    _values: Mapping[str, float]
 
     def __init__(
         self, system: System, directions: Array, loads: Array, served: Array, observed: tuple[int, ...], scale: float
@@ -97,8 +109,8 @@ class Reduction:
         self._shapes = np.zeros((system.n, 0))
         self._small: list[Array] = []
         self._solve: Any = None
-        #: expressions in the matrices and the highest frequency, where the basis was tested
-        self._tested: list[tuple[Array, float]] = []
+        #: where the basis was tested
+        self._tested: list[_Tested] = []
         #: all that have grown from one and are in use, by what they were grown for
         self._larger: weakref.WeakValueDictionary[tuple[Any, ...], Reduction] = weakref.WeakValueDictionary()
 
@@ -121,7 +133,7 @@ class Reduction:
         at = made._expressions(values)
         read = (a.tobytes() for a in (directions, loads, served, at))
         key = (*map(id, made._matrices), *read, observed, scale, frequency)
-        return _kept(_IN_USE, key, lambda: made._grown_to(frequency, values, at))
+        return _kept(_IN_USE, key, lambda: made._grown_to(frequency, values))
 
     def _expressions(self, values: Mapping[str, float]) -> Array:
         return np.array([c.value(values) for matrix in self._matrices for c in matrix.coefficients])
@@ -132,25 +144,48 @@ class Reduction:
             return self
         at, known = self._expressions(values), [self, *self._larger.values()]
         serving = next((one for one in known if one._serves(frequency, at)), None)
+        if serving is not None:
+            return serving
         # it grows from that which lacks least
-        largest = max(known, key=lambda one: one._known_to(at))
-        return serving or _kept(
-            self._larger, (frequency, at.tobytes()), lambda: largest._grown_to(frequency, values, at)
-        )
+        largest = max(known, key=lambda one: (one._known_to(at), len(one._tested)))
+        for there in (largest._ahead(frequency, values, at), values):
+            key = frequency, self._expressions(there).tobytes()
+            largest = _kept(self._larger, key, partial(largest._grown_to, frequency, there))
+            if largest._serves(frequency, at):
+                break
+        return largest
 
     def _known_to(self, at: Array) -> float:
         """Up to which frequency it was tested there, negative where it was not."""
-        return max((covers for tested, covers in self._tested if np.array_equal(tested, at)), default=-1.0)
+        return max((tested.covers for tested in self._tested if np.array_equal(tested.at, at)), default=-1.0)
 
     def _serves(self, frequency: float, at: Array) -> bool:
-        """Whether it was tested there, or near by."""
+        """Whether it was tested there, or on both sides near by."""
+        tested = [one.at for one in self._tested if one.covers >= frequency]
         return any(
-            np.all(np.abs(at - tested) <= _TRUSTED * np.abs(tested)) and covers >= frequency
-            for tested, covers in self._tested
+            _far(one, other) <= _NEAR and np.all((np.minimum(one, other) <= at) & (at <= np.maximum(one, other)))
+            for one, other in combinations_with_replacement(tested, 2)
         )
 
-    def _grown_to(self, frequency: float, values: Mapping[str, float], at: Array) -> Reduction:
-        larger = copy.copy(self)
+    def _ahead(self, frequency: float, values: Mapping[str, float], at: Array) -> Mapping[str, float]:
+        """Values of the parameters beyond some, as seen from the nearest that were tested, as far from these as may be;
+        those themselves where there are none near.
+        """
+        near = min((one for one in self._tested if one.covers >= frequency), key=lambda t: _far(t.at, at), default=None)
+        ahead, times = values, _STEP
+        while near is not None and times <= _AHEAD:
+            further = {name: near.values[name] + times * (value - near.values[name]) for name, value in values.items()}
+            try:
+                beyond = self._expressions(further)
+            except InputError:  # an expression is none there
+                break
+            if not _far(near.at, beyond) <= _NEAR:
+                break
+            ahead, times = further, _STEP * times
+        return ahead
+
+    def _grown_to(self, frequency: float, values: Mapping[str, float]) -> Reduction:
+        at, larger = self._expressions(values), copy.copy(self)
         for kept in ("projected", "error"):
             vars(larger).pop(kept, None)
         left = larger._grown(frequency, values, self._known_to(at))
@@ -159,7 +194,7 @@ class Reduction:
                 f"the projection of the structure has an error of {left:.1e} at frequencies up to {frequency:.6g} with "
                 f"{larger._shapes.shape[1]} vectors: keep fewer harmonics, or damp the structure more"
             )
-        larger._tested, larger._values = [*self._tested, (at, frequency)], dict(values)
+        larger._tested = [*self._tested, _Tested(at, frequency, dict(values))]
         return larger
 
     @lazy
@@ -171,7 +206,7 @@ class Reduction:
         _, modes = eigh(0.5 * (stiffness + stiffness.T), 0.5 * (mass + mass.T))
         shapes = self._shapes @ modes
         matrices = tuple(matrix.projected(shapes) for matrix in self._matrices)
-        return Projected(matrices, shapes, self.directions @ shapes, max(covers for _, covers in self._tested))
+        return Projected(matrices, shapes, self.directions @ shapes, max(one.covers for one in self._tested))
 
     @lazy
     def error(self) -> float:
@@ -183,8 +218,9 @@ class Reduction:
             return 0.0
         along = np.concatenate((self.directions, self.loads))
         seen = along @ shapes
-        m, c, k, s = (matrix.value(self._values) for matrix in self.projected.matrices)
-        exact = exact_flexibility(self.system, along, top, self._values)
+        values = self._tested[-1].values
+        m, c, k, s = (matrix.value(values) for matrix in self.projected.matrices)
+        exact = exact_flexibility(self.system, along, top, values)
         off = np.abs(seen @ np.linalg.solve(k - top**2 * m + 1j * (top * c + s), seen.T) - exact)
         size = np.sqrt(np.abs(exact.diagonal()))
         return float((off / np.multiply.outer(size, size)).max())
@@ -197,6 +233,8 @@ class Reduction:
             self._solve = factorised(basis.matrices[2] + self.scale**2 * basis.matrices[0]).solve
         if not basis.count:
             basis.add(self._solve(np.ascontiguousarray(self.served.T)))
+        # what is between the tested frequencies is known where it served them at other values
+        served = any(one.covers >= top for one in self._tested)
         best, since = math.inf, 0
         before: tuple[list[Array], Array] | None = None
         order = [share for share in _TESTED if share * top > known_to]
@@ -214,7 +252,7 @@ class Reduction:
                     break
             best, since = (worst, 0) if worst < 0.5 * best or worst > _PROMISING else (best, since + 1)
             here = list(basis.small), (self.served @ basis.shapes).T
-            settled = False
+            settled = served and before is None and worst <= _TOLERANCE
             if before is not None and (worst <= _TOLERANCE or since >= _PATIENCE):
                 last, known = (_flexibilities(small, seen, top) for small, seen in (before, here))
                 settled = _change(last, known) <= max(_SETTLED, 3.0 * worst)
@@ -311,6 +349,12 @@ def _kept(
     if found is None:
         found = known[key] = make()
     return found
+
+
+def _far(one: Array, other: Array) -> float:
+    """The largest distance of values of expressions, relative to the larger of two."""
+    size = np.maximum(np.abs(one), np.abs(other))
+    return float((np.abs(one - other) / np.where(size > 0.0, size, 1.0)).max(initial=0.0))
 
 
 def _flexibilities(small: list[Array], seen: Array, top: float) -> ComplexArray:
