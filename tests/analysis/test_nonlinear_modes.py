@@ -404,3 +404,16 @@ def test_an_observed_degree_of_freedom_that_rests_in_the_mode():
     with pytest.raises(so.InputError, match="rests in this mode"):
         so.nonlinear_mode(system, 2, amplitude=1.0, observe=1)
     assert len(so.nonlinear_mode(system, 2, amplitude=0.1, observe=0)) > 2
+
+
+@pytest.mark.parametrize("n", [30, 60])
+def test_a_damped_mode_whose_spring_moves_little(n):
+    """Beside a wall, a hundredth of what moves elsewhere: what damping does there is nothing small to first order."""
+    stiffness = (n / 3.0) ** 2 * (2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1))
+    system = so.System(np.eye(n), 0.02 * np.eye(n) + 0.001 * stiffness, stiffness, [so.CubicSpring(n - 1, 1.0)])
+    mode = so.nonlinear_mode(system, 1, amplitude=(0.01, 0.3))
+    w = 2.0 * n / 3.0 * np.sin(0.5 * np.pi / (n + 1))
+    assert mode.omega[0] == pytest.approx(w, rel=1e-5)
+    assert mode.damping_ratio[0] == pytest.approx(0.01 / w + 0.0005 * w, rel=1e-4)
+    free = so.nonlinear_mode(system, 1, amplitude=(0.01, 0.3), damped=False)
+    assert mode.omega[-1] == pytest.approx(free.omega[-1], rel=1e-6)

@@ -150,6 +150,18 @@ def test_modal_damping_and_fixed_dofs(study_file, frame):
         ('"frame.npz"', '{ file = "frame.npz", damping = { rayleih = [1, 2] } }', ["'rayleigh'"], "structure ="),
         ('"frame.npz"', '{ file = "frame.npz", damping = { rayleigh = 1 } }', ["a list of two"], "structure ="),
         ('"frame.npz"', '{ file = "frame.npz", damping = { modal = -1 } }', ["damping ratios"], "structure ="),
+        (
+            '"frame.npz"',
+            '{ file = "frame.npz", damping = { modal = 0.1, count = 0 } }',
+            ["count must be"],
+            "structure =",
+        ),
+        (
+            '"frame.npz"',
+            '{ file = "frame.npz", damping = { modal = 0.1, cont = 2 } }',
+            ["mean 'count'?"],
+            "structure =",
+        ),
         ('"frame.npz"', '{ file = "frame.npz", damping = 0.1 }', ["a text or a table"], "structure ="),
         ('"frame.npz"', '{ file = "frame.npz", structural = 0.1 }', ["loss_factor"], "structure ="),
         ('"frame.npz"', '{ file = "frame.npz", structural = { eta = 0.1 } }', ["loss_factor"], "structure ="),
@@ -223,6 +235,15 @@ def test_a_beam_needs_no_file(study_file):
     assert repr(system) == repr(script)
     for ours, theirs in zip(system.matrices(), script.matrices(), strict=True):
         np.testing.assert_array_equal(ours, theirs)
+
+
+def test_modal_damping_of_the_first_modes(study_file):
+    from suboctave.structures import beam
+
+    text = BEAM.replace('rayleigh = [3.0, "beta"]', "modal = 0.02, count = 2").replace("beta = 1e-6, ", "")
+    structure = beam(0.7, 0.014, 0.014, 2.05e11, 7800.0, 3).with_damping(so.ModalDamping(0.02, 2))
+    ours, theirs = (system.damping.value({}) for system in (read_study(study_file(text)).system, structure.system()))
+    np.testing.assert_array_equal(ours, theirs)
 
 
 @pytest.mark.parametrize(

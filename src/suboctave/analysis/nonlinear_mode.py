@@ -28,6 +28,7 @@ from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.linear_modes import linear_modes
 from suboctave.model.inputs import check_count, check_is_system, check_range, timed
 from suboctave.model.system import System
+from suboctave.model.updated import largest_entry
 from suboctave.options import with_options
 from suboctave.progress import reporting
 from suboctave.results.modes import ModeCurve
@@ -174,8 +175,8 @@ def _damping(system: System) -> tuple[bool, bool]:
 
 def _sides(matrix: Any) -> tuple[bool, bool]:
     """Whether a sparse matrix has a skew-symmetric part, and a symmetric one."""
-    least = _ROUNDING * float(abs(matrix).max())
-    skew, symmetric = (float(abs(matrix + side * matrix.T).max()) > least for side in (-1.0, 1.0))
+    least = _ROUNDING * largest_entry(matrix)
+    skew, symmetric = (largest_entry(matrix + side * matrix.T) > least for side in (-1.0, 1.0))
     return skew, symmetric
 
 

@@ -52,8 +52,8 @@ def at_rest(balance: HarmonicBalance, omega: float, values: Mapping[str, float])
 
 #: zeta whose forces are lost among those of inertia
 _ROUNDING = float(np.finfo(float).eps)
-#: corrections of zeta, each of which leaves its share of the one before
-_REPEATED = 4
+#: most corrections of zeta, and change of it, absolute and relative, that is none
+_REPEATED, _REMAINS = 30, 1e-15
 
 
 def fed(state: BalanceState, zeta: float) -> BalanceState:
@@ -91,15 +91,19 @@ def damping_ratio(state: BalanceState) -> float:
     """zeta with which a damping of -2 zeta omega per unit of mass balances the work of the forces over a period."""
     zeta = 0.0
     for _ in range(_REPEATED):
-        zeta += _missing(fed(state, zeta))
+        missing = _missing(fed(state, zeta))
+        zeta += missing
+        if abs(missing) <= _REMAINS * (1.0 + abs(zeta)):
+            break
     return zeta
 
 
 def _missing(state: BalanceState) -> float:
-    """What zeta lacks, to first order: of a condensed structure it moves what is eliminated, too."""
+    """What zeta lacks if the whole structure keeps its motion: that of a condensed one zeta moves, but the quotient is
+    stationary there, like Rayleigh's.
+    """
     moving = state.basis.derivative(state.x)
-    momentum = apply_blocks(state.linear.feeding(state.frequencies), state.x)
-    work = -2.0 * state.omega * float(np.vdot(moving, momentum))
+    work = 4.0 * state.omega * twice_kinetic(state) / state.rate
     return float(np.vdot(moving, state.residual.reshape(moving.shape))) / (work or 1.0)
 
 

@@ -36,6 +36,7 @@ from suboctave.interruption import check_time
 from suboctave.lazy import lazy
 from suboctave.model.matrices import MatrixCoefficient, sparse_factors
 from suboctave.model.system import System
+from suboctave.model.updated import Updated
 
 #: degrees of freedom up to which a structure is taken as it is
 COMPLETE = 40
@@ -374,8 +375,10 @@ def _change(one: ComplexArray, other: ComplexArray) -> float:
 
 
 def factorised(matrix: Any) -> Any:
-    """SuperLU's factors of a large sparse matrix."""
+    """What solves the equations of a large sparse matrix, by SuperLU."""
     try:
+        if isinstance(matrix, Updated):
+            return matrix.factorised(sparse_factors(matrix.sparse))
         return sparse_factors(matrix)
     except RuntimeError as failure:
         raise InputError(f"the stiffness cannot be factorised ({failure}): is a part of the structure empty?") from None

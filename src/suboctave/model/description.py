@@ -25,6 +25,7 @@ import numpy as np
 
 from suboctave.errors import InputError, located, shortened, suggest
 from suboctave.model.expressions.coefficients import Coefficient, restored
+from suboctave.model.updated import Updated
 
 Arrays = MutableMapping[str, np.ndarray]
 _PACKAGE = "suboctave."
@@ -32,7 +33,7 @@ _KNOWN: dict[str, type[Recorded]] = {}
 #: entries from which on an array is kept outside the description, where there is an outside
 _LARGE = 64
 #: keys that say what a mapping stands for
-_MARKS = frozenset({"float", "expression", "array", "stored", "sparse", "mapping", "callable", "type"})
+_MARKS = frozenset({"float", "expression", "array", "stored", "sparse", "updated", "mapping", "callable", "type"})
 _DTYPES = ("|b1", *(f"{order}{kind}{size}" for order in "<>|" for kind in "iuf" for size in (1, 2, 4, 8)))
 #: what a matrix in compressed-row form consists of
 _SPARSE = ("data", "indices", "indptr")
@@ -196,6 +197,8 @@ def plain_value(value: Any, arrays: Arrays | None = None) -> Any:
         return {"expression": value.text, "by": list(value.by)} if value.by else {"expression": value.text}
     if isinstance(value, np.ndarray):
         return _plain_array(value, arrays)
+    if isinstance(value, Updated):
+        return {"updated": [plain_value(part, arrays) for part in (value.sparse, value.columns, value.weights)]}
     if hasattr(value, "tocsr"):
         rows = value.tocsr()
         parts = {name: plain_value(np.asarray(getattr(rows, name)), arrays) for name in _SPARSE}
@@ -227,6 +230,8 @@ def from_plain(value: Any, arrays: Mapping[str, np.ndarray], allow_code: bool = 
             return restored(value["expression"], value.get("by", ()))
         case {"array": _, "dtype": _, "shape": _} | {"stored": str()} | {"sparse": Mapping()}:
             return _read_array(value, arrays)
+        case {"updated": [sparse, columns, weights]}:
+            return Updated(*(_read_array(part, arrays) for part in (sparse, columns, weights)))
         case {"mapping": list() as pairs}:
             return {name: from_plain(item, arrays, allow_code) for name, item in pairs}
         case {"callable": str() as place}:

@@ -17,6 +17,7 @@ from suboctave.errors import InputError, NegativeDampingWarning, located
 from suboctave.lazy import lazy
 from suboctave.model.elements.base import Array
 from suboctave.model.expressions.coefficients import Coefficient, coefficient
+from suboctave.model.updated import Updated, largest_entry
 
 #: largest asymmetry of a mass, in units of sqrt(M_ii M_jj)
 _ASYMMETRY = 1e-9
@@ -66,12 +67,10 @@ class MatrixCoefficient:
         return result
 
     def sparse_value(self, values: Mapping[str, float]) -> Any:
-        """The matrix at these values of the parameters in SciPy's compressed-row form."""
-        import scipy.sparse
-
-        result = scipy.sparse.csr_array(self._base, copy=True)
+        """The matrix at these values of the parameters in SciPy's compressed-row form, or `Updated`."""
+        result = _in_rows(self._base)
         for c, pattern in self._terms:
-            result = result + c.value(values) * scipy.sparse.csr_array(pattern)
+            result = result + c.value(values) * _in_rows(pattern)
         return result
 
     def compact(self, values: Mapping[str, float]) -> Any:
@@ -116,7 +115,7 @@ class MatrixCoefficient:
     @lazy
     def zero(self) -> bool:
         """Whether it is zero at any values of the parameters."""
-        return not self._terms and not abs(self._base).max()
+        return not self._terms and not largest_entry(self._base)
 
     @property
     def _patterns(self) -> tuple[Any, ...]:
@@ -132,7 +131,7 @@ class MatrixCoefficient:
         if name not in self._derivatives:
             slopes = [(c.derivative(name), pattern) for c, pattern in self._terms if name in c.names]
             slope = _added(self._base, slopes, f"derivative of {self.what} by {name}")
-            self._derivatives[name] = slope if slope.coefficients or abs(slope._base).max() else None
+            self._derivatives[name] = slope if slope.coefficients or largest_entry(slope._base) else None
         return self._derivatives[name]
 
     def __repr__(self) -> str:
@@ -152,7 +151,7 @@ def matrix_coefficient(source: Any, n: int | None = None, what: str = "matrix") 
         result = source
     elif isinstance(source, Mapping):
         result = _from_terms(source, what)
-    elif hasattr(source, "tocsr"):
+    elif hasattr(source, "tocsr") or isinstance(source, Updated):
         result = MatrixCoefficient(_constant(source, what), (), what)
     else:
         result = _from_entries(source, n, what)
@@ -164,7 +163,9 @@ def matrix_coefficient(source: Any, n: int | None = None, what: str = "matrix") 
 def _constant(source: Any, what: str) -> Any:
     """A square, finite matrix of numbers as a read-only float array, or in compressed-row form."""
     matrix: Any
-    if hasattr(source, "tocsr"):
+    if isinstance(source, Updated):
+        matrix, entries = source, source.data
+    elif hasattr(source, "tocsr"):
         import scipy.sparse
 
         if np.iscomplexobj(source):
@@ -182,6 +183,13 @@ def _constant(source: Any, what: str) -> Any:
     if not np.all(np.isfinite(entries)):
         raise InputError(f"{what} has entries that are not finite")
     return matrix
+
+
+def _in_rows(matrix: Any) -> Any:
+    """A matrix of its own in compressed-row form, or `Updated`."""
+    import scipy.sparse
+
+    return matrix if isinstance(matrix, Updated) else scipy.sparse.csr_array(matrix, copy=True)
 
 
 def _from_entries(source: Any, n: int | None, what: str) -> MatrixCoefficient:

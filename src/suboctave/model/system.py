@@ -500,6 +500,6 @@ def _read_matrix(description: Mapping[str, Any], what: str, arrays: Mapping[str,
     shapes = {matrix.shape for matrix in (base, *(pattern for _, pattern in terms))}
     if len(shapes) != 1 or len(base.shape) != 2 or base.shape[0] != base.shape[1]:
         raise InputError(f"this is not the description of a system: {what} has shapes {sorted(shapes)}")
-    if not hasattr(base, "tocsr"):
+    if isinstance(base, np.ndarray):
         base.setflags(write=False)
     return MatrixCoefficient(base, terms, what)

@@ -6,12 +6,14 @@ that rotations beside displacements do not matter.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from suboctave.errors import InputError, shortened
 from suboctave.model.elements.base import Array
+from suboctave.model.updated import Updated
 from suboctave.structures.dof_map import DofMap, shown_dofs
 
 #: largest asymmetry of scaled entries
@@ -26,6 +28,8 @@ def square_matrix(given: Any, what: str, n: int | None = None) -> Any:
 
     if given is None:
         raise InputError(f"the {what} is missing", (what,))
+    if isinstance(given, Updated):
+        return replace(given, sparse=square_matrix(given.sparse, what, n))
     if not hasattr(given, "tocsr"):
         given = np.asarray(given)
         if given.dtype.kind not in "fiuc" or given.ndim != 2:

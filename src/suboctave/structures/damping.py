@@ -2,6 +2,11 @@
 
     C = M Phi diag(2 zeta omega) Phi^T M,        Phi^T M Phi = I.
 
+With the first modes alone, what `beta K` does not give them already, modes beyond have damping in proportion to
+stiffness (Clough & Penzien, Dynamics of Structures, 2nd ed. 1993, section 12-3):
+
+    C = beta K + M Phi diag(2 zeta omega - beta omega^2) Phi^T M,        beta = 2 zeta_last / omega_last.
+
 Rayleigh's damps a mode of the circular frequency omega with the ratio `alpha / (2 omega) + beta omega / 2`.
 """
 
@@ -15,9 +20,11 @@ import numpy as np
 
 from suboctave.errors import InputError, is_number, shortened
 from suboctave.model.expressions.coefficients import Coefficient, Number, named_coefficient
+from suboctave.model.inputs import check_count
+from suboctave.model.updated import Updated
 from suboctave.structures.frequencies import natural_frequencies
 
-#: DOFs up to which a full matrix of modal damping is made: 32 MB of it
+#: DOFs up to which all modes are damped, by a full matrix: 32 MB of it
 MOST_MODAL = 2000
 
 
@@ -28,6 +35,20 @@ def _check_ratio(ratio: float) -> None:
             f"a damping ratio of {ratio:g} is {100 * ratio:g} per cent of critical: write {ratio / 100:g} for "
             f"{ratio:g} per cent; what is damped so much that it does not vibrate needs a damping matrix"
         )
+
+
+def written_out(matrix: Any) -> Any:
+    """A damping matrix in compressed-row form; InputError where that would be a large full one."""
+    import scipy.sparse
+
+    if not isinstance(matrix, Updated):
+        return matrix
+    if len(matrix.columns) > MOST_MODAL:
+        raise InputError(
+            f"the modal damping of joined structures is a full matrix, here of {len(matrix.columns)} DOFs, and up to "
+            f"{MOST_MODAL} are written to a file: save the structures, and join them when they are read"
+        )
+    return scipy.sparse.csr_array(matrix.toarray())
 
 
 @dataclass(frozen=True)
@@ -90,13 +111,15 @@ class Rayleigh:
 
 @dataclass(frozen=True)
 class ModalDamping:
-    """Damping ratios of the modes, the lowest first; modes beyond those are undamped.
+    """Damping ratios of the modes, the lowest first.
 
     ratios
         One number for `count` modes (all modes where none is given), or one number for each of the first modes.
         Each is below 1: 0.02 is 2 per cent of critical. Rigid-body modes count, and stay undamped.
 
-    The matrix is full: structures of more than 2000 degrees of freedom are refused, take `Rayleigh` there.
+    Modes beyond those given have the last ratio in proportion to their frequency, as damping in proportion to stiffness
+    gives it: with a last ratio of 0 they are undamped. Structures of more than 2000 degrees of freedom need a count:
+    some more than there are modes among the harmonics.
     """
 
     ratios: float | Sequence[float]
@@ -110,18 +133,20 @@ class ModalDamping:
         if not given or not all(is_number(ratio) and ratio >= 0 for ratio in given):
             raise InputError(f"damping ratios are numbers from 0 on, not {shortened(self.ratios)}")
         _check_ratio(max(given))
-        if self.count is not None and (several or isinstance(self.count, bool) or self.count < 1):
-            raise InputError("count= is for one ratio of several modes, and at least 1")
+        if self.count is not None and several:
+            raise InputError("count= is for one ratio of several modes")
+        if self.count is not None:
+            object.__setattr__(self, "count", check_count("count", self.count))
 
     def matrix(self, mass: Any, stiffness: Any) -> Any:
-        """The damping matrix (n, n), in compressed-row form."""
+        """The damping matrix (n, n), in compressed-row form; `Updated` where modes beyond those given are left."""
         import scipy.sparse
 
         n = mass.shape[0]
-        if n > MOST_MODAL:
+        if n > MOST_MODAL and self.count is None and not isinstance(self.ratios, tuple):
             raise InputError(
-                f"modal damping makes a full matrix, of {n} DOFs here; up to {MOST_MODAL} are taken. Use "
-                "Rayleigh.from_ratios((omega1, zeta1), (omega2, zeta2)) in its place"
+                f"modal damping of all modes is for up to {MOST_MODAL} DOFs, not {n}: say how many modes, "
+                f"ModalDamping({self.ratios:g}, count=...), some more than there are among the harmonics"
             )
         ratios = np.array(self.ratios if isinstance(self.ratios, tuple) else [self.ratios] * min(self.count or n, n))
         if len(ratios) > n:
@@ -129,5 +154,11 @@ class ModalDamping:
         found = natural_frequencies(mass, stiffness, len(ratios))
         omega = np.where(np.arange(len(found)) < found.growing + found.rigid, 0.0, found.omega)
         momenta = mass @ found.modes
-        full = (momenta * (2.0 * ratios[: len(omega)] * omega)) @ momenta.T
-        return scipy.sparse.csr_array(0.5 * (full + full.T))
+        rates = 2.0 * ratios[: len(omega)] * omega
+        if len(ratios) == n:
+            full = (momenta * rates) @ momenta.T
+            return scipy.sparse.csr_array(0.5 * (full + full.T))
+        beta = rates[-1] / omega[-1] ** 2 if omega[-1] > 0.0 else 0.0
+        # of motions that grow it takes what their negative stiffness would feed
+        squares = np.where(np.arange(len(omega)) < found.growing, -(found.omega**2), omega**2)
+        return Updated(scipy.sparse.csr_array(beta * stiffness), momenta, rates - beta * squares)

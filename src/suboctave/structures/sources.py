@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from suboctave.errors import InputError, check_numbers, shortened, suggest
 from suboctave.model.elements.base import Array
 from suboctave.model.expressions.coefficients import Coefficient
+from suboctave.model.updated import block_diagonal
 from suboctave.structures.damping import ModalDamping, Rayleigh
 from suboctave.structures.dof_map import DofMap, Label
 from suboctave.structures.mesh import Mesh
@@ -202,8 +203,6 @@ def join(*structures: Structure, names: Sequence[str] = (), places: ArrayLike | 
 
 
 def _joined_damping(structures: Sequence[Structure]) -> Any:
-    from scipy.sparse import block_diag
-
     first = structures[0].damping
     if (first is None or isinstance(first, Rayleigh)) and all(one.damping == first for one in structures[1:]):
         return first
@@ -215,7 +214,7 @@ def _joined_damping(structures: Sequence[Structure]) -> Any:
             if isinstance(damping, Mapping):
                 raise InputError(f"the damping of {one.name!r} has parameters: give damping to the joined structure")
         blocks.append(0.0 * one.mass if damping is None else damping)
-    return block_diag(blocks)
+    return block_diagonal(blocks)
 
 
 def _joined_losses(structures: Sequence[Structure]) -> Any:

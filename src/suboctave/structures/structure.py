@@ -15,8 +15,9 @@ from suboctave.model.elements.base import Array, BaseElement
 from suboctave.model.expressions.coefficients import Coefficient, named_coefficient
 from suboctave.model.loads import Load
 from suboctave.model.system import System
+from suboctave.model.updated import part_of
 from suboctave.structures.checks import inertia_checked, square_matrix, symmetric_matrix
-from suboctave.structures.damping import ModalDamping, Rayleigh
+from suboctave.structures.damping import ModalDamping, Rayleigh, written_out
 from suboctave.structures.dof_map import DofMap, shown_dofs, weighted
 from suboctave.structures.frequencies import NaturalFrequencies, natural_frequencies
 from suboctave.structures.mesh import Mesh
@@ -126,7 +127,7 @@ class Structure:
             raise InputError("all DOFs would be fixed: nothing is left that moves")
         cut = {what: getattr(self, what)[kept][:, kept] for what in ("mass", "stiffness")}
         if not isinstance(self.damping, Rayleigh | ModalDamping | None):
-            cut["damping"] = self.damping[kept][:, kept]
+            cut["damping"] = part_of(self.damping, kept)
         if not isinstance(self.structural, Coefficient | None):
             cut["structural"] = self.structural[kept][:, kept]
         return replace(self, **cut, dofs=None if self.dofs is None else self.dofs.without(gone))
@@ -209,7 +210,7 @@ class Structure:
             raise InputError(f"a structure is saved in an .npz file, not in {file.name}")
         matrices = {"mass": self.mass, "stiffness": self.stiffness}
         if not isinstance(self.damping, Rayleigh | ModalDamping | None):
-            matrices["damping"] = self.damping
+            matrices["damping"] = written_out(self.damping)
         if not isinstance(self.structural, Coefficient | None):
             matrices["structural"] = self.structural
         write(file, matrices, self.dofs, self.mesh, self.damping, self.structural, self.name)

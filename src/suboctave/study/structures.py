@@ -37,8 +37,9 @@ def given_structure(value: Any, folder: Path) -> Structure:
     `{ source = "beam" }` or "plate", with the arguments of these functions, needs no file.
 
     `damping` is the name of a matrix, a file, or one of the tables `{ rayleigh = [alpha, beta] }`,
-    `{ ratios = [[omega1, zeta1], [omega2, zeta2]] }`, `{ modal = ratio or ratios }`; `structural` the name of a matrix,
-    a file, or `{ loss_factor = number or expression }`. Raises InputError, with the key.
+    `{ ratios = [[omega1, zeta1], [omega2, zeta2]] }`, `{ modal = ratio or ratios }`, `{ modal = ratio, count = 40 }`;
+    `structural` the name of a matrix, a file, or `{ loss_factor = number or expression }`. Raises InputError, with the
+    key.
     """
     if isinstance(value, str):
         return read_structure(folder / value)
@@ -97,9 +98,14 @@ def _from_source(given: dict[str, Any]) -> Structure:
 
 
 def _damping(given: Mapping[str, Any]) -> Rayleigh | ModalDamping:
+    if isinstance(given, Mapping) and set(given) == {"modal", "count"}:
+        return ModalDamping(given["modal"], given["count"])
     if not isinstance(given, Mapping) or len(given) != 1 or not set(given) <= set(_DAMPINGS):
-        wrong = next((key for key in (given if isinstance(given, Mapping) else ()) if key not in _DAMPINGS), "")
-        raise InputError(f"damping is one of {', '.join(_DAMPINGS)}{suggest(wrong, _DAMPINGS) if wrong else ''}")
+        known = [*_DAMPINGS, "count"]
+        wrong = next((key for key in (given if isinstance(given, Mapping) else ()) if key not in known), "")
+        raise InputError(
+            f"damping is one of {', '.join(_DAMPINGS)}, modal with count{suggest(wrong, known) if wrong else ''}"
+        )
     (kind, value), *_ = given.items()
     if kind == "modal":
         return ModalDamping(value)
