@@ -32,6 +32,8 @@ from suboctave.harmonic.linear_part import LinearPart
 _CUTS = 12
 #: orders of substitutes, those first that are most often the least work
 _ORDERS = (1, 2, 0)
+#: share of the states of one level that another must have less to be looked for
+_FEWER = 0.1
 #: condition of a substitute's states beyond which it is none
 _PARALLEL = 1e6
 #: part of a direction that others do not hold, relative, below which it depends on them
@@ -128,14 +130,15 @@ class Levels:
         return None if few is None else _level(blocks, slow, few)
 
     def fewest(self, along: Along, resolved: float, tolerable: float) -> Choice:
-        """The level with fewest states of those without which multipliers move no farther than is tolerable; all blocks
-        with rates up to `resolved` have states.
+        """The level with about the fewest states of those by which multipliers move no farther than is tolerable; all
+        blocks with rates up to `resolved` have states.
         """
         least, count = self.whole, 2 * len(self.blocks.active)
         resolving = int(np.searchsorted(self._rates, resolved, side="right"))
         for order in _ORDERS:
             # the more slow blocks there are, the less is left out
-            low, high = resolving, int(np.searchsorted(self._first, least.level.states - count * order))
+            most = (1.0 - _FEWER) * least.level.states - count * order
+            low, high = resolving, int(np.searchsorted(self._first, most))
             while low < high:
                 # beside one that serves another seldom does with fewer states
                 middle = (low + high) // 2 if order == _ORDERS[0] else high - 1

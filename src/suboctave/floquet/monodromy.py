@@ -437,6 +437,9 @@ def projector(phi: Array, mu: ComplexArray) -> Array:
     reach = _TOGETHER * float(np.abs(1.0 - mu).min())
     schur, q, count = scipy.linalg.schur(phi, sort=lambda re, im: math.hypot(1.0 - re, im) <= reach)
     inside, coupling, outside = schur[:count, :count], schur[:count, count:], schur[count:, count:]
-    beside = scipy.linalg.solve_sylvester(inside, -outside, coupling) if 0 < count < len(phi) else coupling
+    beside = coupling
+    if 0 < count < len(phi):
+        beside, scale, _ = lapack.dtrsyl(inside, outside, coupling, isgn=-1)
+        beside = beside / scale
     result: Array = q[:, :count] @ np.hstack((np.eye(count), beside)) @ q.T
     return result

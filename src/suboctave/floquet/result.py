@@ -9,9 +9,26 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from suboctave.compiled import kernel
 from suboctave.floquet.symmetric import UNDAMPED, distinct, symmetric_functions
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.lazy import lazy
+
+
+@kernel()
+def _off_the_circle(mu, errors):
+    """Largest modulus minus one, whether all are off the circle by more than their errors, how many are outside, and
+    the distance of the nearest one.
+    """
+    largest, decided, outside, nearest = -np.inf, True, 0, np.inf
+    for i in range(mu.shape[0]):
+        beyond = abs(mu[i]) - 1.0
+        if not beyond <= largest:
+            largest = beyond if not math.isnan(largest) else largest
+        decided = decided and abs(beyond) > errors[i]
+        outside += beyond > 0.0
+        nearest = min(nearest, abs(beyond))
+    return largest, decided, outside, nearest
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -63,12 +80,8 @@ class FloquetResult:
 
     @lazy
     def _verdict(self) -> tuple[float, bool, int, float]:
-        # largest modulus minus one, whether all are off the circle by more than their errors, how many are outside, and
-        # the distance of the nearest one; there are few: numbers are quicker than arrays
-        beyond = [abs(mu) - 1.0 for mu in self.multipliers.tolist()]
-        decided = all(abs(b) > error for b, error in zip(beyond, self.errors.tolist(), strict=True))
-        largest = math.nan if any(map(math.isnan, beyond)) else max(beyond)
-        return largest, decided, sum(b > 0.0 for b in beyond), min(map(abs, beyond))
+        result: tuple[float, bool, int, float] = _off_the_circle(self.multipliers, self.errors)
+        return result
 
     @property
     def margin(self) -> float:

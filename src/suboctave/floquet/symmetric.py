@@ -36,15 +36,20 @@ _LARGE = 1e280
 _INSIDE = 0.25
 
 
-def distinct(mu: ComplexArray) -> ComplexArray:
-    """Multipliers without those that equal another one: a symmetric system has families of equal ones all along a
+@kernel()
+def distinct(mu):
+    """Multipliers (m,) without those that equal another one: a symmetric system has families of equal ones all along a
     branch, of which one stands for all. Where two such families are each other's inverses torus has a multiple zero.
     Those that have decayed to nothing are no family.
     """
-    if len(mu) < 2:
-        return mu
-    alike = np.abs(mu[:, None] - mu[None, :]) < EQUAL * np.abs(mu)[:, None]
-    return mu[~np.tril(alike, -1).any(axis=1)]
+    kept = np.ones(mu.shape[0], dtype=np.bool_)
+    for i in range(mu.shape[0]):
+        near = EQUAL * abs(mu[i])
+        for j in range(i):
+            if abs(mu[i].real - mu[j].real) < near and abs(mu[i] - mu[j]) < near:
+                kept[i] = False
+                break
+    return mu[kept]
 
 
 def symmetric_functions(mu: ComplexArray) -> Array:
