@@ -532,3 +532,23 @@ def test_observed_by_name():
 def test_a_place_by_its_label_is_refused_with_what_to_write(dof, number):
     with pytest.raises(InputError, match=re.escape(f"has the number {number}")):
         so.ElasticStop(dof, 1.0, 0.1)
+
+
+@pytest.mark.parametrize("damping", [so.ModalDamping(0.02), so.ModalDamping(0.02, 2), so.Rayleigh(0.1, "b")])
+@pytest.mark.parametrize("sparse", [True, False])
+def test_a_system_takes_what_a_structure_does(structure, damping, sparse):
+    mass, stiffness = structure.mass, structure.stiffness
+    if not sparse:
+        mass, stiffness = mass.toarray(), stiffness.toarray()
+    parameters = {"b": 1e-3} if isinstance(damping, so.Rayleigh) else {}
+    system = so.System(mass, damping, stiffness, parameters=parameters)
+    wanted = structure.system(damping=damping, parameters=parameters).damping
+    np.testing.assert_allclose(system.damping.value(parameters), wanted.value(parameters), atol=1e-12)
+    assert system.damping.sparse == sparse
+
+
+def test_damping_by_modes_of_matrices_with_parameters_is_refused():
+    with pytest.raises(so.InputError, match="without parameters, but k is in them"):
+        so.System(1.0, so.ModalDamping(0.01), "k", parameters={"k": 2.0})
+    one = so.System(1.0, so.ModalDamping(0.01), 4.0)
+    assert one.damping.value({})[0, 0] == pytest.approx(0.04)

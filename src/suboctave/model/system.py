@@ -34,9 +34,10 @@ class System:
 
     `mass`, `damping`, `stiffness`: a number or an expression (one degree of freedom), nested lists or arrays (n, n) of
     numbers and expressions, sparse matrices, or `{expression: matrix}` for a sum; the mass symmetric positive definite
-    at the parameters, the other two of any kind. `elements`: a sequence of `Element`; their forces stand on the left-
-    hand side (those that are integrated at nodes of their own come last). `loads`: a sequence of `HarmonicLoad` and
-    other loads, on the right-hand side. `parameters`: `{name: number}`, every one of them used somewhere.
+    at the parameters, the other two of any kind; damping also `Rayleigh` or `ModalDamping`. `elements`: a sequence of
+    `Element`; their forces stand on the left-hand side (those that are integrated at nodes of their own come last).
+    `loads`: a sequence of `HarmonicLoad` and other loads, on the right-hand side. `parameters`: `{name: number}`, every
+    one of them used somewhere.
     `structural`: structural damping S, a force `i S x` at every frequency: like the other matrices, `{"eta": K}` for a
     loss factor. `dof_names`: names for messages. Units are the user's own, if they are consistent; frequencies are
     circular. `units`: their names, length, force (or mass) and time, such as `"mm, N, s"`, for axes and tables; nothing
@@ -72,11 +73,14 @@ class System:
         units: str | None = None,
     ) -> None:
         read = matrix_coefficient(mass, None, "mass")
+        stiff = matrix_coefficient(stiffness, read.n, "stiffness")
+        if hasattr(damping, "matrix"):
+            damping = _made_of(damping, read, stiff)
         self._fill(
             check=True,
             mass=read,
             damping=matrix_coefficient(damping, read.n, "damping"),
-            stiffness=matrix_coefficient(stiffness, read.n, "stiffness"),
+            stiffness=stiff,
             structural=read.zeros("structural")
             if structural is None
             else matrix_coefficient(structural, read.n, "structural"),
@@ -437,6 +441,21 @@ def _number(name: str, value: Any) -> float:
     if isinstance(value, bool) or not is_number(value):
         raise InputError(f"parameter {name!r} must be a finite number, not {shortened(value)}")
     return float(value)
+
+
+def _made_of(damping: Any, mass: MatrixCoefficient, stiffness: MatrixCoefficient) -> Any:
+    """The matrix of a damping that is said by mass and stiffness: `Rayleigh` or `ModalDamping`."""
+    if names := sorted(mass.names | stiffness.names):
+        raise InputError(
+            f"{type(damping).__name__} needs a mass and a stiffness without parameters, but {', '.join(names)} "
+            f"{'is' if len(names) == 1 else 'are'} in them: give the damping matrix, such as {{'alpha': mass}}"
+        )
+    made = damping.matrix(mass.sparse_value({}), stiffness.sparse_value({}))
+    if mass.sparse or stiffness.sparse:
+        return made
+    if isinstance(made, Mapping):
+        return {expression: matrix.toarray() for expression, matrix in made.items()}
+    return made.toarray()
 
 
 # ------------------------------------------------------------------------------------------------------- description
