@@ -339,6 +339,22 @@ def test_what_is_no_damping_is_refused(make):
         make()
 
 
+@pytest.mark.parametrize("lowest", [0.0, 1.5, 30.0])
+def test_frequencies_of_many_degrees_of_freedom(lowest):
+    """Also where the stiffness is not positive, and has to be eliminated with pivots."""
+    n = 900
+    parts = [-np.ones(n - 1), np.full(n, 2.0), -np.ones(n - 1)]
+    stiffness = n**2 / np.pi**2 * scipy.sparse.diags_array(parts, offsets=[-1, 0, 1]) - lowest * scipy.sparse.eye_array(
+        n
+    )
+    structure = so.Structure(scipy.sparse.eye_array(n).tocsr(), stiffness.tocsr())
+    squares = (2.0 * n / np.pi * np.sin(0.5 * np.pi * np.arange(1, n + 1) / (n + 1))) ** 2 - lowest
+    found = structure.frequencies(8)
+    wanted = np.sign(squares) * np.sqrt(np.abs(squares))
+    np.testing.assert_allclose(found.omega, np.sort(wanted[:8]), rtol=1e-7)
+    assert found.growing == (squares < 0.0).sum()
+
+
 def rod(n, damping):
     """A rod held at one end, a stop and a load at the other; the first frequency is near 1."""
     stiffness = scipy.sparse.diags_array(

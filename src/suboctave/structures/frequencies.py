@@ -8,6 +8,7 @@ rigid-body modes a second one is of the size of the first elastic eigenvalue. Sm
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +16,7 @@ import numpy as np
 
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.model.elements.base import Array
+from suboctave.model.matrices import sparse_factors
 
 #: DOFs below which eigenvalues are computed densely
 _DENSE = 300
@@ -24,6 +26,8 @@ _SHIFT = 1e-10
 _ROUNDING = 1e-13
 #: restarts of Lanczos's method; structures take less than ten, modes closer than 1e-6 of their frequency more
 _RESTARTS = 60
+#: relative change of a matrix that a solution without pivots off the diagonal may be the exact one of
+_BACKWARD = 1e-12
 #: a shift so far below the first elastic eigenvalue loses digits beside rigid-body modes
 _FAR = 1e-3
 
@@ -126,19 +130,38 @@ def _densely(mass: Any, stiffness: Any, shift: float, count: int) -> tuple[Array
 
 
 def _by_lanczos(mass: Any, stiffness: Any, shift: float, count: int) -> tuple[Array, Array]:
-    from scipy.sparse.linalg import ArpackError, eigsh
+    from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 
     n = mass.shape[0]
     start = np.random.default_rng(1).standard_normal(n)  # the same digits in every run
     size = min(max(3 * count, count + 40), n)
     try:
+        inverse = LinearOperator((n, n), _inverse(stiffness - shift * mass, start), dtype=float)
         squares, vectors = eigsh(
-            stiffness.tocsc(), k=count, M=mass.tocsc(), sigma=shift, v0=start, ncv=size, maxiter=_RESTARTS
+            stiffness, k=count, M=mass, sigma=shift, v0=start, ncv=size, maxiter=_RESTARTS, OPinv=inverse
         )
     except (ArpackError, RuntimeError) as error:
         reason = " ".join(str(error).split())
         raise ConvergenceError(f"the natural frequencies were not found, they may lie too close: {reason}") from None
     return _ascending(squares, vectors, mass)
+
+
+def _inverse(matrix: Any, sample: Array) -> Callable[[Array], Array]:
+    """What solves the equations of a symmetric matrix: with pivots on its diagonal alone where they are good enough, as
+    those of a positive stiffness are.
+    """
+    from scipy.sparse.linalg import splu
+
+    try:
+        solve: Callable[[Array], Array] = sparse_factors(matrix).solve
+        solution = solve(sample)
+        size = float(abs(matrix).sum(axis=1).max()) * np.abs(solution).max()
+        if np.abs(matrix @ solution - sample).max() <= _BACKWARD * size:
+            return solve
+    except RuntimeError:  # a zero on the diagonal
+        pass
+    pivoted: Callable[[Array], Array] = splu(matrix.tocsc()).solve
+    return pivoted
 
 
 def _ascending(squares: Array, vectors: Array, mass: Any) -> tuple[Array, Array]:
