@@ -13,7 +13,7 @@ from suboctave.errors import InputError
 from suboctave.floquet.monodromy import floquet_multipliers
 from suboctave.harmonic import HarmonicBalance, HarmonicBasis, StructuralMatrices, condensed
 from suboctave.harmonic.condensed import linear_part_of
-from suboctave.harmonic.elimination import states_of
+from suboctave.harmonic.elimination import complex_modes
 
 N = 6
 
@@ -174,14 +174,14 @@ def coupled(damping=0.02):
     )  # fmt: skip
 
 
-def test_states_stand_for_vibrations_that_damping_couples(monkeypatch):
+def test_complex_modes_stand_for_vibrations_that_damping_couples(monkeypatch):
     """What they make of everything is what a solution at every frequency makes of it."""
     frequency = np.array([0.0, 0.7, 1.9, 13.0])
     amplitudes = np.array([[1.0], [0.4 - 1j], [0.2j], [0.1]])
 
     def made(states):
         linear = linear_part_of(coupled())
-        assert (linear._states is not None) == states
+        assert (linear._modes is not None) == states
         parts = [linear.stiffness(frequency, order) for order in range(3)]
         parts += [linear.stiffness_by(frequency, names) for names in (("c",), ("k",), ("c", "k"), ("k", "k"))]
         parts += [linear.stiffness_by(frequency, ("c",), 1), linear.loaded(frequency), linear.loaded(frequency, ("k",))]
@@ -190,7 +190,7 @@ def test_states_stand_for_vibrations_that_damping_couples(monkeypatch):
 
     by_states = made(True)
     with monkeypatch.context() as patch:
-        patch.setattr(condensed, "states_of", lambda damping, stiffness: None)
+        patch.setattr(condensed, "complex_modes", lambda damping, stiffness: None)
         by_solution = made(False)
     for one, other in zip(by_states, by_solution, strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-11, atol=1e-12 * np.abs(other).max())
@@ -199,12 +199,12 @@ def test_states_stand_for_vibrations_that_damping_couples(monkeypatch):
     np.testing.assert_allclose(by_states[0][:, 0, 0], exact, rtol=1e-11)
 
 
-def test_states_that_lie_together_are_none():
+def test_complex_modes_that_lie_together_are_none():
     """Critical damping of one vibration leaves it one direction."""
     stiffness, damping = np.diag([1.0, 4.0]), np.array([[2.0, 1e-7], [1e-7, 0.1]])
-    assert states_of(damping, stiffness) is None
-    assert states_of(0.1 * damping, stiffness) is not None
-    assert states_of(np.diag([0.1, 0.2]), stiffness) is None
+    assert complex_modes(damping, stiffness) is None
+    assert complex_modes(0.1 * damping, stiffness) is not None
+    assert complex_modes(np.diag([0.1, 0.2]), stiffness) is None
 
 
 def test_modal_damping_gives_the_same_curve():
@@ -212,7 +212,7 @@ def test_modal_damping_gives_the_same_curve():
     structure = so.Structure(own.mass.value({}), own.stiffness.value({"k": 1.0}), damping=so.ModalDamping(0.01))
     system = structure.system(list(own.elements), [so.HarmonicLoad(0, 0.5)])
     few, all_known = so.frequency_response(system, (1.0, 1.1), harmonics=9), whole(system, (1.0, 1.1), harmonics=9)
-    assert few.orbits[0].state().linear._states is not None
+    assert few.orbits[0].state().linear._modes is not None
     assert len(few.bifurcations) == len(all_known.bifurcations) >= 2
     for one, other in zip(few.bifurcations, all_known.bifurcations, strict=True):
         assert one.kind == other.kind

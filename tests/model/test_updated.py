@@ -39,7 +39,7 @@ def test_it_is_the_sum_of_both():
     assert len(a.data) == a.sparse.nnz + K + N * K
 
 
-@pytest.mark.parametrize("weights", [(1.0, -0.5, 2.0), (1.0, 0.0, 2.0), (1j, 0.5, 2.0 - 1j)])
+@pytest.mark.parametrize("weights", [(1.0, -0.5, 2.0), (1.0, 0.0, 2.0), (0.0, 0.0, 0.0), (1j, 0.5, 2.0 - 1j)])
 def test_its_equations(weights):
     a = made(weights=weights)
     right = np.random.default_rng(3).normal(size=(N, 4)).astype(a.weights.dtype)

@@ -14,7 +14,7 @@ Behind the last coefficient that is known those of a stiffness that jumps follow
 integral of `D J^2 / Omega^2`, which vanishes over all frequencies where D does so at rest with its first derivative:
 the part beyond takes back that below. It meets one that comes a time t later in the free vibrations between,
 
-    2 pi J^2 sum_k c_k exp(s_k t) / s_k^2,    D(s) = sum_k c_k / (s - s_k),
+    2 pi omega J^2 sum_k c_k exp(s_k t) / s_k^2,    D(s) = sum_k c_k / (s - s_k),
 
 where soon after a jump those that stand in nearly cancel those that they stand in for; what earlier periods leave comes
 in any phase. Of many pairs of jumps squares add.
@@ -356,9 +356,9 @@ def _answered(missing, frequency, force, back, damped):
 
 @kernel(fastmath=_FAST, error_model="numpy")
 def _echoes(missing, rate, last, jumps):
-    """How much of a jump of each channel, that drives, those of each, that reads, meet in free vibrations faster than
-    `last`, of displacements and rates, (2, G, G), where the jumps of a channel are alike; of channels whose jumps are
-    not known no more than |D| tells. See `moved_without`.
+    """Free vibrations faster than `last` that jumps of channel h set off, as jumps of channel g meet them, of
+    displacements and rates, (2, G, G) by g and h. The jumps of a channel count alike; where those of a channel are not
+    known, the mean of |D| is a bound. See `moved_without`.
     """
     count, groups, states = jumps.at.shape[0], missing.own.shape[1], missing.exponents.shape[0]
     squares, share = np.zeros((2, groups, groups)), np.zeros(groups)

@@ -32,7 +32,7 @@ from suboctave.harmonic.linear_part import LinearPart
 _CUTS = 12
 #: orders of substitutes, those first that are most often the least work
 _ORDERS = (1, 2, 0)
-#: share of the states of one level that another must have less to be looked for
+#: share of its states that another level must save to be looked for
 _FEWER = 0.1
 #: condition of a substitute's states beyond which it is none
 _PARALLEL = 1e6

@@ -23,8 +23,8 @@ def _off_the_circle(mu, errors):
     largest, decided, outside, nearest = -np.inf, True, 0, np.inf
     for i in range(mu.shape[0]):
         beyond = abs(mu[i]) - 1.0
-        if not beyond <= largest:
-            largest = beyond if not math.isnan(largest) else largest
+        if not (beyond <= largest or math.isnan(largest)):
+            largest = beyond
         decided = decided and abs(beyond) > errors[i]
         outside += beyond > 0.0
         nearest = min(nearest, abs(beyond))

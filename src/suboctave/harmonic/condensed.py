@@ -30,7 +30,7 @@ from scipy.linalg import eigh
 
 from suboctave.errors import ConvergenceError, InputError, shortened
 from suboctave.harmonic.basis import Array, ComplexArray
-from suboctave.harmonic.elimination import Stack, States, states_of
+from suboctave.harmonic.elimination import ComplexModes, Stack, complex_modes
 from suboctave.harmonic.linear_part import (
     LinearPart,
     StructuralMatrices,
@@ -167,18 +167,18 @@ class Condensed:
         return Coordinates(static, modes @ (null @ turn), squares, unit, held)
 
     @lazy
-    def _states(self) -> States | None:
-        """Those of the vibrations, where they are coordinates in their place."""
-        _, damping, stiffness, structural = self._vibrating
-        return None if structural[3].any() else states_of(damping[3], stiffness[3])
+    def _modes(self) -> ComplexModes | None:
+        """Those of the vibrations, where they are coordinates in the place of these."""
+        _, damping, stiffness, structural = self._parts
+        return None if structural[3].any() else complex_modes(damping[3], stiffness[3])
 
-    def _split(self, matrices: Array, states: States | None = None) -> list[tuple[NDArray[Any], ...]]:
-        """Matrices (., r, r) in the coordinates (q, z), or states for z, each as qq, qz, zq, zz, with nothing in the
+    def _split(self, matrices: Array, modes: ComplexModes | None = None) -> list[tuple[NDArray[Any], ...]]:
+        """Matrices (., r, r) in the coordinates (q, z), or modes for z, each as qq, qz, zq, zz, with nothing in the
         loads' columns.
         """
         static, free = self._coordinates.static, self._coordinates.free
-        right = np.concatenate((static, free if states is None else free @ states.columns), axis=1)
-        left = np.concatenate((static, free if states is None else free @ states.rows.T), axis=1).T
+        right = np.concatenate((static, free if modes is None else free @ modes.columns), axis=1)
+        left = np.concatenate((static, free if modes is None else free @ modes.rows.T), axis=1).T
         m, none = self.size, np.zeros((len(left), len(self._loads)))
         parts: list[tuple[NDArray[Any], ...]] = []
         for matrix in matrices:
@@ -188,7 +188,7 @@ class Condensed:
         return parts
 
     @lazy
-    def _vibrating(self) -> list[tuple[Array, ...]]:
+    def _parts(self) -> list[tuple[Array, ...]]:
         """M, C, K, S in the coordinates (q, z), see `_split`."""
         static, free, squares, unit, held = self._coordinates
         m, k = self.size, self._matrices[2]
@@ -204,16 +204,20 @@ class Condensed:
         return [(*mass[:3], np.eye(len(squares))), damping, stiffness, structural]
 
     @lazy
+    def _plain(self) -> Stack:
+        """The same in one row."""
+        return Stack.of(self._parts)
+
+    @lazy
     def _own(self) -> Stack:
-        """The same, with states for z where these are better."""
-        parts, states = self._vibrating, self._states
-        if states is None:
-            return Stack.of(parts)
-        none = np.zeros((len(states.exponents), len(states.exponents)))
-        inner = none, np.eye(len(none)), np.diag(-states.exponents), none
-        return Stack.of(
-            [(qq, qz @ states.columns, states.rows @ zq, zz) for (qq, qz, zq, _), zz in zip(parts, inner, strict=True)]
-        )
+        """The same, with complex modes for z where damping couples these."""
+        modes = self._modes
+        if modes is None:
+            return self._plain
+        none = np.zeros((len(modes.exponents), len(modes.exponents)))
+        inner = none, np.eye(len(none)), np.diag(-modes.exponents), none
+        outer = [(qq, qz @ modes.columns, modes.rows @ zq) for qq, qz, zq, _ in self._parts]
+        return Stack.of([(*part, zz) for part, zz in zip(outer, inner, strict=True)])
 
     # ------------------------------------------------------------------------------------------------------- blocks
     def _stack(self, names: tuple[str, ...]) -> Stack | None:
@@ -221,7 +225,7 @@ class Condensed:
         if not names:
             return self._own
         parts = differentiated(self.projected.matrices, names, self.values)
-        return None if parts is None else Stack.of(self._split(parts, self._states))
+        return None if parts is None else Stack.of(self._split(parts, self._modes))
 
     def _eliminated(self, frequency: NDArray[Any]) -> tuple[ComplexArray, ComplexArray, dict[Any, Any]]:
         """`Z_zz^-1 Z_zq` at frequencies, the transpose of `Z_qz Z_zz^-1`, and what is known there of A and its
@@ -264,13 +268,13 @@ class Condensed:
 
     def fed(self, rate: float) -> Condensed:
         """See `LinearPart.fed`; the coordinates are those of this part."""
-        whole = Stack.of(self._vibrating)
+        whole = self._plain
         other = copy.copy(self)
         other._last = other._other = other._wider = None
         other._matrices = fed_matrices(self._matrices, rate)
-        for made in ("_equation", "_vibrating", "_feeding"):
+        for made in ("_equation", "_parts", "_plain", "_feeding"):
             vars(other).pop(made, None)
-        vars(other)["_states"], vars(other)["_own"] = None, whole._replace(entries=fed_matrices(whole.entries, rate))
+        vars(other)["_modes"], vars(other)["_own"] = None, whole._replace(entries=fed_matrices(whole.entries, rate))
         return other
 
     def feeding(self, frequency: Array) -> ComplexArray:
@@ -280,7 +284,7 @@ class Condensed:
 
     @lazy
     def _feeding(self) -> Stack:
-        return Stack.of(self._split(feeding_matrices(self._matrices), self._states))
+        return Stack.of(self._split(feeding_matrices(self._matrices), self._modes))
 
     def _unknowns_alone(self, whole: ComplexArray) -> ComplexArray:
         """Without the loads' columns."""
@@ -350,7 +354,7 @@ class Condensed:
     def recovered(self, frequency: Array, amplitudes: ComplexArray, loads: ComplexArray | None = None) -> ComplexArray:
         """See `LinearPart.recovered`."""
         static, free = self._coordinates.static, self._coordinates.free
-        shapes = free if self._states is None else free @ self._states.columns
+        shapes = free if self._modes is None else free @ self._modes.columns
         columns = amplitudes
         if len(self._loads):
             none = np.zeros((len(amplitudes), len(self._loads)))

@@ -7,12 +7,13 @@ With Z the dynamic stiffness in coordinates (q, z), which `condensed` explains,
 and what a change of Z does to A is the same form of that change, as neither side moves it to first order; two changes a
 and b add `- (a_qz - left^T a_zz) Z_zz^-1 (b_zq - b_zz right)` and the same with a and b exchanged.
 
-Where Z_zz is a diagonal all this costs nothing. Where damping couples the vibrations z it is one in their 2 s states,
-with the eigenvectors of these: `lambda^2 x + lambda C_zz x + K_zz x = 0` has
+Where Z_zz is a diagonal all this costs nothing. Where damping couples the vibrations z their 2 s complex modes take
+their place: with `lambda^2 x + lambda C_zz x + K_zz x = 0`
 
     Z_zz^-1 = X (i Omega - Lambda)^-1 Y,
 
-X (s, 2 s) and Y (2 s, s), so that `Z_qz X` and `Y Z_zq` couple with coordinates whose Z is `i Omega - Lambda`.
+X (s, 2 s) and Y (2 s, s), so that `Z_qz X` and `Y Z_zq` couple with coordinates whose Z is the diagonal `i Omega -
+Lambda`.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from suboctave.harmonic.linear_part import factors
 _FAST = {"reassoc", "contract", "nsz"}
 #: entries of a matrix relative to its diagonal that are rounding
 _ROUNDING, _BESIDE = 1e-12, 1e-9
-#: condition of eigenvectors of states beyond which they cost digits
+#: condition of complex modes beyond which they cost digits
 _PARALLEL = 1e4
 #: least frequency that scales a state, relative to the largest
 _LEAST = 1e-6
@@ -232,7 +233,7 @@ def answered(entries, diagonal, frequency, a, a_diagonal, a_order, b, b_diagonal
                         out[f, i, j] += across[side, k, i] * along[side, k, j]
 
 
-class States(NamedTuple):
+class ComplexModes(NamedTuple):
     """X (s, 2 s), Y (2 s, s) and Lambda (2 s,) of vibrations, see the module."""
 
     columns: ComplexArray
@@ -240,8 +241,8 @@ class States(NamedTuple):
     exponents: ComplexArray
 
 
-def states_of(damping: Array, stiffness: Array) -> States | None:
-    """Of vibrations with unit mass; None where the damping couples none of them, or eigenvectors are near parallel."""
+def complex_modes(damping: Array, stiffness: Array) -> ComplexModes | None:
+    """Of vibrations with unit mass; None where damping couples none of them, or two are nearly parallel."""
     s = len(damping)
     if _is_diagonal(damping) and _is_diagonal(stiffness):
         return None
@@ -252,7 +253,7 @@ def states_of(damping: Array, stiffness: Array) -> States | None:
         return None
     columns, rows = right[:s] / scale[:, None], np.linalg.inv(right)[:, s:]
     alike = np.sqrt(np.linalg.norm(columns, axis=0) / np.linalg.norm(rows, axis=1))
-    return States(columns / alike, alike[:, None] * rows, exponents)
+    return ComplexModes(columns / alike, alike[:, None] * rows, exponents)
 
 
 def _is_diagonal(matrix: NDArray[Any]) -> bool:

@@ -57,7 +57,7 @@ _WRONG = 1e-3
 _MOST, _ROOM = 600, 40
 #: distance of two values of every expression in a matrix, relative, up to which what serves at both serves between
 _NEAR = 1.0 / 3.0
-#: how many times the way to a value of the parameters a basis may grow ahead of it, and steps to there
+#: how many times farther than the value asked for a basis may grow, and the ratio of the ways tried
 _AHEAD, _STEP = 100.0, 1.5
 
 
@@ -151,7 +151,11 @@ class Reduction:
         largest = max(known, key=lambda one: (one._known_to(at), len(one._tested)))
         for there in (largest._ahead(frequency, values, at), values):
             key = frequency, self._expressions(there).tobytes()
-            largest = _kept(self._larger, key, partial(largest._grown_to, frequency, there))
+            try:
+                largest = _kept(self._larger, key, partial(largest._grown_to, frequency, there))
+            except ConvergenceError:
+                if there is values:  # none ahead is asked for
+                    raise
             if largest._serves(frequency, at):
                 break
         return largest

@@ -51,9 +51,8 @@ def check_system(system: System, omega: tuple[float, ...] = ()) -> None:
         _check_held(system)
 
 
-@functools.lru_cache(maxsize=16)
 def _check_held(system: System) -> None:
-    """Refuse a body that nothing holds: the mean of its motion is not determined. Examined once."""
+    """Refuse a body that nothing holds: the mean of its motion is not determined."""
     mass, _, stiffness = system.matrices()
     scale = 1.0 / np.sqrt(np.diag(mass))
     with np.errstate(over="ignore", invalid="ignore"):

@@ -161,7 +161,7 @@ def matrix_coefficient(source: Any, n: int | None = None, what: str = "matrix") 
 
 
 def _constant(source: Any, what: str) -> Any:
-    """A square, finite matrix of numbers as a read-only float array, or in compressed-row form."""
+    """A square, finite matrix of numbers as a read-only float array, in compressed-row form, or `Updated`."""
     matrix: Any
     if isinstance(source, Updated):
         matrix, entries = source, source.data

@@ -93,9 +93,11 @@ class Updated:
         """A bound of its largest entry: entries of U diag(|w|) U^T are no larger than those on the diagonal."""
         return float(abs(self.sparse).max()) + float((self.columns**2 @ np.abs(self.weights)).max())
 
-    def factorised(self, factors: Any) -> UpdatedFactors:
+    def factorised(self, factors: Any) -> Any:
         """What solves its equations; factors: of S, with `solve`."""
         kept = self.weights != 0.0
+        if not kept.any():
+            return factors
         columns = self.columns[:, kept].astype(np.result_type(self.sparse.dtype, self.weights))
         answers = factors.solve(np.ascontiguousarray(columns))
         inside = np.diag(1.0 / self.weights[kept]) + columns.T @ answers
