@@ -15,6 +15,7 @@ from suboctave.curves import follow as follow_module
 from suboctave.errors import ConvergenceError
 from suboctave.interruption import Interruption
 from suboctave.results.files import branch_from_dataset, branch_to_dataset
+from suboctave.timedomain import flow
 
 #: everything public that may take long
 VERBS = (
@@ -25,27 +26,31 @@ VERBS = (
 )
 
 
+class Clock:
+    """One that moves on by one second whenever a time limit is looked at: so many looks, the same in every run."""
+
+    def __init__(self, monkeypatch):
+        self.now = 0.0
+        monkeypatch.setattr(interruption, "monotonic", self)
+        # the pieces that trajectories are followed in, and what their threads report, go by the time that they take
+        monkeypatch.setattr(flow, "perf_counter", lambda: 0.0)
+        monkeypatch.setattr(flow, "processors", lambda: 1)
+
+    def __call__(self):
+        self.now += 1.0
+        return self.now
+
+    def of(self, work):
+        """How many looks some work takes, of which a part is then given as its time limit."""
+        self.now = 0.0
+        work(seconds=1e9)
+        looks, self.now = self.now, 0.0
+        return looks
+
+
 @pytest.fixture
 def ticks(monkeypatch):
-    """A clock that moves on by one second whenever a time limit is looked at: so many looks, the same in every run."""
-
-    class Clock:
-        now = 0.0
-
-        def __call__(self):
-            self.now += 1.0
-            return self.now
-
-        def of(self, work):
-            """How many looks some work takes, of which a part is then given as its time limit."""
-            self.now = 0.0
-            work(seconds=1e9)
-            looks, self.now = self.now, 0.0
-            return looks
-
-    clock = Clock()
-    monkeypatch.setattr(interruption, "monotonic", clock)
-    return clock
+    return Clock(monkeypatch)
 
 
 class Stop:
@@ -286,18 +291,11 @@ def basins_of_a_duffing_oscillator(seconds):
 @pytest.fixture(scope="module")
 def whole_basins():
     """The basins, and how often the clock is looked at for them."""
-    count = 0
-
-    def clock():
-        nonlocal count
-        count += 1
-        return float(count)
-
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(interruption, "monotonic", clock)
+        clock = Clock(patched)
         whole = basins_of_a_duffing_oscillator(1e9)
     assert whole.complete
-    return whole, count
+    return whole, clock.now
 
 
 def test_a_search_for_subharmonics_gives_the_branches_that_it_has(ticks):

@@ -111,6 +111,36 @@ class Bracket:
             failure = ConvergenceError(f"Newton's method left the curve for {curve.where(solved.u)}")
         raise failure
 
+    def narrowed(self, width: float) -> tuple[float, float]:
+        """The shares, no further apart, of two points with the zero between them, by secants and halvings. None of the
+        points lies at the zero itself, where the equations of the curve may be singular. Raises ConvergenceError.
+        """
+        low, high = self._change()
+        while high - low > width:
+            first, last = self.values[low], self.values[high]
+            share = low + (high - low) * first / (first - last)
+            for aside in (share - 0.5 * width, share + 0.5 * width, None):
+                place = 0.5 * (low + high) if aside is None else aside
+                if low < place < high and high - low > width:
+                    low, high = (low, place) if self.value(place) * first <= 0.0 else (place, high)
+        return low, high
+
+    def between(self, low: float, high: float) -> Array:
+        """The unknowns where the function vanishes by its values at two shares, on the cubic between their points."""
+        first, last = self.values[low], self.values[high]
+        return between(self.points[low], self.points[high], first / (first - last))
+
+    def _change(self) -> tuple[float, float]:
+        """The first two shares in succession at which the function has different signs; raises ConvergenceError."""
+        for low, high in pairwise(sorted(self.values)):
+            if self.values[low] * self.values[high] <= 0.0 and self.values[low] != self.values[high]:
+                return low, high
+        raise self._none()
+
+    def _none(self) -> ConvergenceError:
+        a, b = self.points[0.0], self.points[1.0]
+        return ConvergenceError(f"no zero was located between {a.curve.where(a.u)} and {b.curve.where(b.u)}")
+
     def zero(self, resolved: float = 1e-12) -> float:
         """The share at which the function vanishes, to so much of it, by Brent's method; its point is in `points` then.
 
@@ -137,5 +167,4 @@ class Bracket:
                 )
                 if result.converged:
                     return float(share)
-        a, b = self.points[0.0], self.points[1.0]
-        raise ConvergenceError(f"no zero was located between {a.curve.where(a.u)} and {b.curve.where(b.u)}")
+        raise self._none()

@@ -41,7 +41,13 @@ from suboctave.curves.kinds.limit_cycle import LimitCycle, oscillating
 from suboctave.curves.kinds.singular import SingularOperator
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.sample import Sample
-from suboctave.curves.tracked.events import LocatedEvent, nearest_point, same_discretisation, zero_along
+from suboctave.curves.tracked.events import (
+    LocatedEvent,
+    crossing_in,
+    nearest_point,
+    same_discretisation,
+    zero_along,
+)
 from suboctave.curves.tracked.tests import CurvesCross, CurveTest, DoubleMultiplier, GeneralisedDoubling
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.evaluation import BalanceState
@@ -184,8 +190,8 @@ def _in_its_parent(a: Sample, b: Sample, newton: NewtonOptions) -> End:
 
 
 def _tip(a: Sample, b: Sample, newton: NewtonOptions) -> LocatedEvent:
-    """The BP at which odd harmonics vanish: where they do, as the orientation may change for others besides, and of a
-    tongue of high order as good as not; raises ConvergenceError.
+    """The BP at which odd harmonics vanish, found where they do: the orientation may change for others besides, and of
+    a tongue of high order as good as not. Raises ConvergenceError.
     """
     start = same_discretisation(a, b, newton)
     odd = _oscillation(start)[1]
@@ -194,7 +200,7 @@ def _tip(a: Sample, b: Sample, newton: NewtonOptions) -> LocatedEvent:
         return float(np.vdot(odd, _oscillation(Sample(point))[1]))
 
     bracket = Bracket(start.point, b.point, (left(start.point), left(b.point)), left, newton)
-    return LocatedEvent(CurvesCross(), Sample(bracket.points[bracket.zero()]), ends=(start, b))
+    return crossing_in(bracket, LocatedEvent(CurvesCross(), b, ends=(start, b)))
 
 
 def resonant_between(a: Sample, b: Sample) -> float | None:

@@ -159,6 +159,8 @@ _ASIDE = 1e-4
 SAME = 5e-3
 #: share of a step to which an event is located, at once and where more harmonics are to follow
 _RESOLVED, _ROUGH = 1e-11, 1e-3
+#: share of a step between points on both sides of a crossing of curves
+_ACROSS = 1e-2
 #: share of a test's values at the ends of a step above which one that has been resolved jumps instead of vanishing
 _JUMP = 0.5
 #: with how many other numbers of harmonics an event is compared; way in scaled arclength by which one that stays moves
@@ -265,7 +267,7 @@ def located(test: CurveTest, low: Sample, high: Sample, newton: NewtonOptions) -
         return LocatedEvent(own, sample, own.extreme(-slope, sample), None, slope, ends=(same, high))
     bracket = Bracket(same.point, high.point, (first, last), lambda point: own.value(Sample(point)), newton)
     if isinstance(own, CurvesCross):
-        return _crossing_in(bracket, LocatedEvent(own, high, ends=(same, high)))
+        return crossing_in(bracket, LocatedEvent(own, high, ends=(same, high)))
     little = _JUMP * min(abs(first), abs(last))
     # on a curve of extrema those that others bring about are known by their distance; multipliers tell only close by
     apart = high.curve.augmentation.turning or type(own).genuine is not CurveTest.genuine or isinstance(own, Extremum)
@@ -296,21 +298,28 @@ def located(test: CurveTest, low: Sample, high: Sample, newton: NewtonOptions) -
     )
 
 
-def _crossing_in(bracket: Bracket, event: LocatedEvent) -> LocatedEvent:
-    """An event at which curves cross in a bracket: by equations that are regular there, from as near as they need.
-    Raises ConvergenceError, also where none cross.
+def crossing_in(bracket: Bracket, event: LocatedEvent) -> LocatedEvent:
+    """An event (its sample: the far end) at which curves cross in a bracket, by equations that are regular there: those
+    of a curve are singular, and what they give close by is rounding. Raises ConvergenceError, also where none cross.
+
+    Where two directions lead away, or all but, the others are singular, too: then on the cubic between points beside.
     """
-    for resolved in (_ROUGH, _RESOLVED):
-        point = bracket.points[bracket.zero(resolved)]
-        event = replace(event, sample=Sample(point))
+    curve = event.sample.curve
+    for width in (1.0, _ACROSS):
+        u = bracket.between(*bracket.narrowed(width))
         with suppress(ConvergenceError):
-            sample = _crossing(event, event.sample.curve, point.u)
-            share = bracket.share(sample.point.u)
-            if 0.0 <= share <= 1.0:
-                arclength = point.arclength + (share - bracket.share(point.u)) * bracket.way
-                return replace(event, sample=sample.at(replace(sample.point, arclength=arclength)))
+            sample = _crossing(event, curve, u)
+            if 0.0 <= bracket.share(sample.point.u) <= 1.0:
+                return _within(bracket, event, sample)
+    event = _within(bracket, event, _placed(event, curve, u))
     event.test.genuine(event.sample)
     return event
+
+
+def _within(bracket: Bracket, event: LocatedEvent, sample: Sample) -> LocatedEvent:
+    """An event at a sample in a bracket, with its place along the curve."""
+    arclength = bracket.points[0.0].arclength + bracket.share(sample.point.u) * bracket.way
+    return replace(event, sample=sample.at(replace(sample.point, arclength=arclength)))
 
 
 def _begins(test: CurveTest, at: Sample, newton: NewtonOptions) -> bool:
@@ -465,17 +474,20 @@ def _with_more(event: LocatedEvent, sample: Sample, basis: HarmonicBasis, newton
 
 
 def _crossing(event: LocatedEvent, curve: MotionProblem, u: Array) -> Sample:
-    """Where curves cross beside u, by equations that are regular there, as those of the curve are not, with the
-    direction of the curve, which its own equations do not tell there; raises ConvergenceError.
-    """
+    """Where curves cross beside u, by equations that are regular there; raises ConvergenceError."""
+    weights = curve.weights(u, event.sample.curve.size(event.sample.point.u))
+    try:
+        return _placed(event, curve, crossing_point(curve, u, weights))
+    except np.linalg.LinAlgError as singular:
+        raise ConvergenceError(f"no crossing of curves was found beside {curve.where(u)}") from singular
+
+
+def _placed(event: LocatedEvent, curve: MotionProblem, u: Array) -> Sample:
+    """A crossing of curves at u, with the direction of the curve, which its own equations do not tell there."""
     point = event.sample.point
     weights = curve.weights(u, point.curve.size(point.u))
     chord = event.chord()
     along = curve.transfer(point.tangent if chord is None else chord, point.curve)
-    try:
-        u = crossing_point(curve, u, weights)
-    except np.linalg.LinAlgError as singular:
-        raise ConvergenceError(f"no crossing of curves was found beside {curve.where(u)}") from singular
     tangent = along / length(weights * along)
     return event.sample.at(
         replace(point, curve=curve, u=u, tangent=tangent, weights=weights, evaluation=curve.evaluate(u), factor=None)
