@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -205,6 +207,19 @@ def test_hopf_points_and_limit_points_meet_in_a_bogdanov_takens_point():
     from_there = so.track(hopf.bifurcations[0], "d", (-1.0, 1.0))
     assert from_there.kind == "LP"
     assert np.abs(from_there.parameter("b")).max() < 1e-9
+
+
+@pytest.mark.parametrize("size", [0.0, 1e-150, -1e-75, 1e-30, -1e-12])
+def test_a_limit_point_at_rest_is_followed_however_nearly_it_rests(size):
+    """x^2 = b: Newton's method comes to x = 0 through ever smaller motions, and ends where rounding has it."""
+    system = so.System.from_equations("x'' + d*x' - b + x**2 = 0", {"d": 0.5, "b": 0.6})
+    (fold,) = so.equilibria(system, "b", (0.9, -0.1), start=[0.9]).bifurcations["LP"]
+    orbit = fold.orbit
+    x = np.zeros_like(orbit.x)
+    x[0] = size
+    limits = so.track(replace(fold, orbit=replace(orbit, x=x)), "d", (0.1, 1.0))
+    assert np.abs(limits.parameter("b")).max() < 1e-12
+    assert limits.parameter("d")[[0, -1]] == pytest.approx([0.1, 1.0])
 
 
 def test_a_driven_motion_of_one_harmonic_is_no_equilibrium():

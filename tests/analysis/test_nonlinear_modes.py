@@ -114,6 +114,18 @@ def test_the_tongue_leads_to_the_other_mode(lower, tongue):
     assert tongue.energy.max() == pytest.approx(148.660, abs=1e-2)
 
 
+def test_the_tip_of_a_tongue_does_not_depend_on_rounding(tongue):
+    """Two directions lead away there, of four-fold symmetry: the equations of the curve are singular, and twice."""
+    tips = [event.omega for event in tongue.bifurcations if abs(event.orbit.harmonic(1)) < 1e-3]
+    assert tips[0] == pytest.approx(tips[1], rel=1e-9)
+    for change in (-3e-13, -1e-13, 2e-13, 4e-13):
+        system = so.System(np.eye(2), np.zeros((2, 2)), (1.0 + change) * STIFFNESS, elements=[so.CubicSpring(0, 0.5)])
+        (crossing,) = so.nonlinear_mode(system, 1, amplitude=(0.01, 5.0)).bifurcations["BP"]
+        again = so.switch_branch(crossing)
+        assert [event.kind for event in again.bifurcations] == ["BP", "LP", "BP", "LP", "BP"]
+        assert [again.bifurcations[i].omega for i in (0, -1)] == pytest.approx(tips, rel=1e-9)
+
+
 def mode_of_a_chain(n, element, amplitude):
     mass, stiffness = (matrix.toarray() for matrix in chain_matrices(n))
     return so.nonlinear_mode(so.System(mass, np.zeros((n, n)), stiffness, elements=[element]), 2, amplitude=amplitude)

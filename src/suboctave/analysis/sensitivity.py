@@ -96,10 +96,10 @@ class Sensitivity(Mapping[str, Mapping[str, float]]):
         where = ", ".join(f"{name} = {value:.7g}" for name, value in self.position.items())
         lines = [f"Sensitivity of the {self.kind} at {where}"]
         heads = "".join(f"{'d ' + of:>16}{'% per %':>11}" for of in self.position)
-        lines.append(f"{'parameter':<14}{'value':>12}{heads}")
+        lines.append(f"{'parameter':<14} {'value':>11}{heads}")
         for name in self.ranked(next(iter(self.position))):
             shown = "".join(f"{self[name][of]:>16.6g}{self.per_cent(name, of):>11.4g}" for of in self.position)
-            lines.append(f"{name:<14}{self.held[name]:>12.6g}{shown}")
+            lines.append(f"{name:<14} {self.held[name]:>11.6g}{shown}")
         return "\n".join(lines)
 
 

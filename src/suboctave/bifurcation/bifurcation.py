@@ -297,9 +297,9 @@ class BifurcationList:
         free = [name for name in dict.fromkeys(n for b in self.met for n in b.free_names) if name != "omega"]
         width = max(6, 1 + max(len(b.kind) for b in self.met))
         head = (
-            f"{'kind':<{width}}{'omega':>13}"
-            + "".join(f"{name:>14}" for name in free)
-            + f"{'amplitude':>14}{'multiplier':>24}{'criticality':>15}{'residual':>11}"
+            f"{'kind':<{width}} {'omega':>12}"
+            + "".join(f" {name:>13}" for name in free)
+            + f" {'amplitude':>13}{'multiplier':>24}{'criticality':>15}{'residual':>11}"
         )
         rows = [head]
         for b in self.met:
@@ -307,11 +307,11 @@ class BifurcationList:
             text = f"{mu.real:.6f}" + (f"{mu.imag:+.6f}i" if abs(mu.imag) > 1e-7 else "")
             # of an equilibrium they are those of a frequency that is a matter of the method
             text = "" if b.kind == "Hopf" else text
-            extra = "".join(f"{b.parameter(name):>14.8g}" for name in free)
+            extra = "".join(f" {b.parameter(name):>13.8g}" for name in free)
             remark = b.remark()
             label = b.criticality or ("" if b.normal_form is None else b.normal_form.shape)
             rows.append(
-                f"{b.kind:<{width}}{b.omega:>13.9g}{extra}{b.amplitude:>14.7g}{text:>24}{label:>15}{b.residual:>11.1e}"
+                f"{b.kind:<{width}} {b.omega:>12.9g}{extra} {b.amplitude:>13.7g}{text:>24}{label:>15}{b.residual:>11.1e}"
                 + (f"  {remark}" if remark else "")
             )
         return "\n".join(rows)

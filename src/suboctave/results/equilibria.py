@@ -75,12 +75,12 @@ class Equilibria(Branch):
 
     def __repr__(self) -> str:
         notes = [f"  note: {warning}" for warning in self.warnings]
-        rows = [f"{'kind':<6}{self.name:>14}{'omega':>13}{'position':>14}{'criticality':>15}{'residual':>11}"]
+        rows = [f"{'kind':<6} {self.name:>13} {'omega':>12} {'position':>13}{'criticality':>15}{'residual':>11}"]
         for b in self.bifurcations:
             frequency = f"{b.omega:.9g}" if b.kind == "Hopf" else ""
             label, remark = b.criticality or "", b.remark()
             rows.append(
-                f"{b.kind:<6}{b.parameter(self.name):>14.8g}{frequency:>13}{b.amplitude:>14.7g}{label:>15}"
+                f"{b.kind:<6} {b.parameter(self.name):>13.8g} {frequency:>12} {b.amplitude:>13.7g}{label:>15}"
                 f"{b.residual:>11.1e}" + (f"  {remark}" if remark else "")
             )
         table = rows if len(rows) > 1 else ["no bifurcations"]

@@ -26,7 +26,7 @@ from suboctave.curves.starts import own_linear_part, settled
 from suboctave.curves.trace import Settings
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.basis import HarmonicBasis
-from suboctave.harmonic.evaluation import HarmonicBalance
+from suboctave.harmonic.evaluation import BalanceState, HarmonicBalance
 from suboctave.harmonic.truncation import AdaptiveHarmonics
 from suboctave.kinds import KINDS, MOTION_KINDS
 
@@ -36,8 +36,8 @@ Ranges = Mapping[str, tuple[float, float]]
 #: a start moves at most this far from the located point, or the motion given, in units of the parameters' spans and of
 #: the motion
 _NEAR, _BESIDE = 0.05, 0.5
-#: forces up to which a motion is one at rest, in any units: Newton's method comes to rest through ever smaller ones
-_NOTHING = 1e-100
+#: forces, as a share of what the parameters change them by over their ranges, up to which a motion is one at rest
+_NOTHING = 1e-9
 
 
 def inside(values: Mapping[str, float], ranges: Ranges) -> bool:
@@ -98,7 +98,8 @@ def curve_through(
     orbit = item.orbit
     widths = {**(item.context or {}).get("bounds", {})} if is_extremum(item) else {}
     widths |= ranges or {}
-    spans = [abs(float(widths[n][1]) - float(widths[n][0])) if n in widths else abs(item.parameter(n)) for n in names]
+    ends = [widths.get(name, (0.0, item.parameter(name))) for name in names]
+    spans = tuple(abs(float(high) - float(low)) or 1.0 for low, high in ends)
     equations = _equations(item, names, formulation)
     linear, x = own_linear_part(orbit), orbit.x
     if linear is not None and equations.reads_observed:
@@ -108,22 +109,28 @@ def curve_through(
     balance = HarmonicBalance(orbit.system, basis, linear=linear).settle(x, orbit.omega)
     state = balance.at(x, orbit.omega)
     augmentation, extra = equations.through(item, state, names)
-    force = state.balanced.scale
+    force, change = state.balanced.scale, _change(state, names, spans)
     curve = MotionProblem(
         balance,
         names,
-        tuple(span or 1.0 for span in spans),
+        spans,
         orbit.omega,
         adaptive,
         # between what a response curve needs and what a located event does
         0.0 if adaptive is None else math.sqrt(adaptive.tolerance * adaptive.event_tolerance),
         augmentation,
-        # nothing but a motion of unit size measures one at rest
-        reference=0.0 if force > _NOTHING else 1.0,
+        # a motion at rest is measured by one whose masses need such forces; where there are none, by one of unit size
+        reference=0.0 if force > _NOTHING * change else change / state.rate**2 or 1.0,
         unbounded=frozenset(names) - widths.keys(),
     )
     curve.force = max(force, curve.least_force(state))
     return curve, curve.join(x, np.array([item.parameter(name) for name in names]), extra)
+
+
+def _change(state: BalanceState, names: tuple[str, ...], spans: tuple[float, ...]) -> float:
+    """By how much forces change at a motion while parameters run over their spans, in the units of `balanced`."""
+    weights = state.balance.row_weights(state.balance.dimension)
+    return sum(span * length(weights * state.residual_by(name)) for name, span in zip(names, spans, strict=True))
 
 
 def with_extremum(curve: MotionProblem, u: np.ndarray, turning: str) -> MotionProblem:
