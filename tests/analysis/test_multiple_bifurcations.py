@@ -19,6 +19,7 @@ from suboctave.curves.kinds.multiple import MultiplePoint
 from suboctave.curves.tracked.start import curve_through
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.perturbation import Kind
+from suboctave.timedomain import locate_by_shooting
 
 DAMPING = 0.03
 
@@ -128,6 +129,15 @@ def test_a_double_branch_point(in_phase):
     matrix = monodromy(points[0], -0.02 * 3.0, {3: 0.5}, 0.01)
     assert np.linalg.det(matrix - np.eye(2)) == pytest.approx(0.0, abs=1e-7)
     assert so.verify(points[0]).agrees
+
+
+def test_a_double_branch_point_by_shooting_from_any_place_beside_it(in_phase):
+    """Three directions lead on from there, of which one is the curve's; the determinant touches zero."""
+    event, rng = in_phase.bifurcations["BP"][0], np.random.default_rng(5)
+    for _ in range(4):
+        start = event.orbit.start() + 1e-7 * rng.standard_normal(6)
+        found = locate_by_shooting(event.orbit.system, "BP", start, event.omega, reach=0.1, multiplicity=2)
+        assert found.omega == pytest.approx(event.omega, rel=1e-7)
 
 
 def test_branches_of_a_double_branch_point(in_phase):

@@ -5,6 +5,7 @@ import pytest
 
 import suboctave as so
 from suboctave.bifurcation.gaps import gap_extrema, height_at
+from suboctave.verification.motions import pairing
 
 
 def events(curve):
@@ -26,7 +27,7 @@ def test_a_stop_between_two_masses_written_as_a_text():
     expected, found = (so.frequency_response(system, (2.2, 1.25), 25) for system in (stop, written))
     assert len(expected.bifurcations) > 1
     same(events(found), events(expected))
-    np.testing.assert_allclose(found.multipliers[-1], expected.multipliers[-1], atol=1e-7)
+    assert pairing(found.multipliers[-1], expected.multipliers[-1]) < 1e-7
     assert found.warnings == expected.warnings
 
 

@@ -311,8 +311,8 @@ class BifurcationList:
             remark = b.remark()
             label = b.criticality or ("" if b.normal_form is None else b.normal_form.shape)
             rows.append(
-                f"{b.kind:<{width}} {b.omega:>12.9g}{extra} {b.amplitude:>13.7g}{text:>24}{label:>15}{b.residual:>11.1e}"
-                + (f"  {remark}" if remark else "")
+                f"{b.kind:<{width}} {b.omega:>12.9g}{extra} {b.amplitude:>13.7g}{text:>24}{label:>15}"
+                f"{b.residual:>11.1e}" + (f"  {remark}" if remark else "")
             )
         return "\n".join(rows)
 

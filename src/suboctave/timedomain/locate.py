@@ -98,14 +98,12 @@ class Curve:
             floor = self.tol * max(1.0, size[0])
             # At the floor one more step still brings digits of omega, unless the last one brought none.
             if residual <= (floor if residual > 0.1 * previous else 0.01 * floor):
-                tangent = right[-1]
-                if along is not None:
-                    null = right[-1:] if keep.all() else right[-2:]
-                    tangent = null.T @ (null @ along)
-                    tangent /= np.linalg.norm(tangent)
-                elif tangent[-1] < 0.0:
-                    tangent = -tangent
-                return CurvePoint(u, slopes, tangent, transition, residual)
+                # where other curves cross, of all directions that of the curve: the one ahead, or at first the one in
+                # which eta changes, as it does in none that a symmetry tells from the curve
+                null = right[np.count_nonzero(keep) :]
+                tangent = null.T @ (null @ (np.eye(1, self.m + 1, self.m)[0] if along is None else along))
+                whole = float(np.linalg.norm(tangent))
+                return CurvePoint(u, slopes, tangent / whole if whole > 0.0 else null[-1], transition, residual)
             length = float(np.max(np.abs(step)))
             u = u + step * min(1.0, 0.5 / length if length > 0.0 else 1.0)
             previous = residual
@@ -116,13 +114,17 @@ class Curve:
         )
 
 
-def _determinant(kind: str, point: CurvePoint) -> float:
-    """What vanishes, changing its sign, at a bifurcation of this kind."""
+def _determinant(kind: str, multiplicity: int, point: CurvePoint) -> float:
+    """What vanishes like the way to a bifurcation of this kind, and changes its sign unless an even number of
+    multipliers is critical at once.
+    """
     if kind == "LP":
         return float(point.tangent[-1])
     if kind == "PD":
-        return float(np.linalg.det(point.transition + np.eye(len(point.transition))))
-    return float(np.linalg.det(np.vstack([point.slopes, point.tangent])))
+        value = float(np.linalg.det(point.transition + np.eye(len(point.transition))))
+    else:
+        value = float(np.linalg.det(np.vstack([point.slopes, point.tangent])))
+    return float(np.copysign(abs(value) ** (1.0 / multiplicity), value))
 
 
 def _neimark_sacker(start: CurvePoint) -> Callable[[CurvePoint], float]:
@@ -156,15 +158,18 @@ def locate_by_shooting(
     rtol: float = 1e-12,
     reach: float | None = None,
     budget: int | None = None,
+    multiplicity: int = 1,
 ) -> PeriodicSolution:
     """The LP, PD, NS or BP nearest along the curve of periodic motions through a start, `omega` free.
 
     `state` (2n,), `omega`: a start near it. `periods`: those of the motion itself (a PD that leads from 2T to 4T has
     2). `max_step`: longest step along the curve, in units of the size of the motion. `reach`: how far along the curve
     it is looked for, in the same units, where the first steps do not lead to it; `budget`: passes through the motion
-    with its tangent flow that may be spent (default: neither is bounded but by `max_iterations`). The returned solution
-    has `kind`, and in `test` what is left of the test function. Raises `InputError`, or `ConvergenceError` with the
-    place it got to. A BP is found where a symmetry makes the crossing branches exist at all.
+    with its tangent flow that may be spent (default: neither is bounded but by `max_iterations`). `multiplicity`: how
+    many multipliers are critical at a PD or BP that a symmetry makes multiple; an even number of them changes no sign,
+    and is found from close by only. The returned solution has `kind`, and in `test` what is left of the test function.
+    Raises `InputError`, or `ConvergenceError` with the place it got to. A BP is found where a symmetry makes the
+    crossing branches exist at all.
     """
     if kind not in _KINDS:
         raise InputError(f"unknown kind of bifurcation {kind!r}{suggest(str(kind), _KINDS)}")
@@ -172,7 +177,7 @@ def locate_by_shooting(
     model, start = _in_its_size(system, state, omega, values, periods)
     curve = Curve(model, periods, rtol, tol, kind == "BP", budget)
     point = curve.onto(start, None)
-    point, test, steps = _drive(curve, point, kind, max_step, max_iterations, reach)
+    point, test, steps = _drive(curve, point, kind, multiplicity, max_step, max_iterations, reach)
 
     final = model.at_frequency(point.u[-1] * model.reference)
     solution = finish(
@@ -251,11 +256,18 @@ def shoot_cycle(
 
 
 def _drive(
-    curve: Curve, start: CurvePoint, kind: str, max_step: float, max_iterations: int, reach: float | None
+    curve: Curve,
+    start: CurvePoint,
+    kind: str,
+    multiplicity: int,
+    max_step: float,
+    max_iterations: int,
+    reach: float | None,
 ) -> tuple[CurvePoint, float, int]:
     """The bifurcation on the curve: by secants from the start; if they lead nowhere, between two scanned points."""
+    measure = _neimark_sacker(start) if kind == "NS" else partial(_determinant, kind, multiplicity)
     try:
-        located = _secants(curve, kind, start, None, max_step, max_iterations)
+        located = _secants(curve, measure, start, None, max_step, max_iterations)
     except _Spent:
         raise
     except ConvergenceError:  # a step too far
@@ -264,7 +276,8 @@ def _drive(
         return located
     pair = _scan(curve, kind, start, max_step, max_iterations, np.inf if reach is None else reach)
     if pair is not None:
-        located = _secants(curve, kind, pair[1], pair[0], max_step, max_iterations)
+        measure = _neimark_sacker(pair[1]) if kind == "NS" else measure
+        located = _secants(curve, measure, pair[1], pair[0], max_step, max_iterations)
         if located is not None:
             return located
     far, more = f"{max_iterations} steps", f", or allow longer steps (max_step = {max_step:g})"
@@ -277,13 +290,17 @@ def _drive(
 
 
 def _secants(
-    curve: Curve, kind: str, start: CurvePoint, other: CurvePoint | None, max_step: float, max_iterations: int
+    curve: Curve,
+    measure: Callable[[CurvePoint], float],
+    start: CurvePoint,
+    other: CurvePoint | None,
+    max_step: float,
+    max_iterations: int,
 ) -> tuple[CurvePoint, float, int] | None:
     """Secant iteration on the test function along the curve, kept inside a bracket once there is one.
 
     `other`: a neighbour on the far side, where one is known. None when the test function does not get smaller.
     """
-    measure = _neimark_sacker(start) if kind == "NS" else partial(_determinant, kind)
     point, value = start, measure(start)
     best = (abs(value), point, value)
     step, bracket = _FIRST_STEP, other
@@ -294,7 +311,7 @@ def _secants(
         following = curve.onto(point.u + step * point.tangent, point.tangent)
         new = measure(following)
         moved = float(point.tangent @ (following.u - point.u))
-        idle = 0 if abs(new) < 0.5 * best[0] else idle + 1
+        idle = 0 if abs(new) < 0.5 * abs(value) else idle + 1
         if abs(new) < best[0]:
             best = (abs(new), following, new)
         if new == 0.0:
@@ -350,7 +367,7 @@ def _scan(
 def _side(kind: str, point: CurvePoint) -> float:
     """What changes at a bifurcation of this kind, and has no pole: a sign, or for NS a number of pairs."""
     if kind != "NS":
-        return float(np.sign(_determinant(kind, point)))
+        return float(np.sign(_determinant(kind, 1, point)))
     multipliers = np.linalg.eigvals(point.transition)
     return float(np.sum((np.abs(multipliers) > 1.0) & (multipliers.imag != 0.0)) // 2)
 

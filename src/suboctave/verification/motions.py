@@ -97,12 +97,13 @@ def verify_motion(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: fl
     projection = system if isinstance(system, ProjectedSystem) else None
     touches = isinstance(what, Bifurcation) and what.kind in CONTACT_KINDS
     alone = not motion.system.driven
-    kind = what.kind if isinstance(what, Bifurcation) and what.kind in LOCATED and not alone else None
+    located = what if isinstance(what, Bifurcation) and what.kind in LOCATED and not alone else None
+    kind = None if located is None else located.kind
     try:
         if alone and np.any(motion.x[1:]):
             folds = isinstance(what, Bifurcation) and what.kind in ("LP", "BP")
             solution = shoot_cycle(system, start, motion.omega, periods=motion.basis.nu, corrected=not folds)
-        elif kind is None:
+        elif located is None:
             # where a multiplier may be +1, as at a limit point, a true motion of the same omega is as far away as the
             # square root of what separates two curves, or there is none: the nearest one of the curve is taken
             apart, errors = np.abs(1.0 - floquet.multipliers), floquet.errors
@@ -110,7 +111,7 @@ def verify_motion(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: fl
             nearest = shoot_along if beside_fold else shoot
             solution = nearest(system, start, motion.omega, periods=motion.basis.nu)
         else:
-            solution = _by_shooting(system, motion, kind, start, tolerance)
+            solution = _by_shooting(system, located, start, tolerance)
     except ConvergenceError as failure:
         what_failed = "shooting found no motion from here" if kind is None else "shooting did not locate it"
         largest = float(np.abs(floquet.multipliers).max(initial=0.0))
@@ -257,22 +258,25 @@ def recovered_solution(system: System, solution: PeriodicSolution) -> PeriodicSo
     return replace(solution, state=system.recovered(solution.state)[:], dof=system.watched[solution.dof])
 
 
-def _by_shooting(system: System, motion: PeriodicOrbit, kind: str, start: Array, tolerance: float) -> PeriodicSolution:
+def _by_shooting(system: System, item: Bifurcation, start: Array, tolerance: float) -> PeriodicSolution:
     """The bifurcation located by shooting, or the motion at the same omega.
 
     The latter where the search loses the multiplier but the count of unstable ones changes as it should within a tenth
     of the tolerance on either side.
     """
-    omega, periods = motion.omega, motion.basis.nu
+    omega, periods, several = item.orbit.omega, item.orbit.basis.nu, item.multiplicity
+    reach = _REACH * tolerance
     try:
-        return locate_by_shooting(system, kind, start, omega, periods=periods, reach=_REACH * tolerance, budget=_PASSES)
+        return locate_by_shooting(
+            system, item.kind, start, omega, periods=periods, reach=reach, budget=_PASSES, multiplicity=several
+        )
     except ConvergenceError:
-        crossing = {"PD": 1, "NS": 2}.get(kind)
+        crossing = {"PD": 1, "NS": 2}.get(item.kind)
         if crossing is None:
             raise
         sides = [shoot(system, start, omega * (1.0 + s * 0.1 * tolerance), periods=periods) for s in (-1.0, 1.0)]
         counts = [int(np.count_nonzero(np.abs(side.multipliers) > 1.0)) for side in sides]
-        if abs(counts[1] - counts[0]) != crossing:
+        if abs(counts[1] - counts[0]) != several * crossing:
             raise
         return shoot(system, start, omega, periods=periods)
 
