@@ -106,10 +106,10 @@ def test_depth_and_budgets_end_it_and_say_what_is_left(strong, options, branches
 
 @pytest.mark.parametrize("wrong", [{"depth": -1}, {"depth": 1.5}, {"max_branches": 0}, {"seconds": 0.0}])
 def test_wrong_input_is_refused_before_any_work(strong, wrong):
-    begin = time.perf_counter()
+    begin = time.process_time()
     with pytest.raises(InputError, match=next(iter(wrong))):
         so.bifurcation_diagram(strong, RANGE, **wrong)
-    assert time.perf_counter() - begin < 0.1
+    assert time.process_time() - begin < 0.1
 
 
 def test_ctrl_c_keeps_the_branches_that_are_there(strong):

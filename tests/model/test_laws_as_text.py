@@ -146,12 +146,12 @@ REFUSED = [
 
 @pytest.mark.parametrize(("text", "part"), REFUSED, ids=[case[0][:30] for case in REFUSED])
 def test_what_is_no_force_is_refused_quickly_and_in_one_line(text, part):
-    begin = time.perf_counter()
+    begin = time.process_time()
     with pytest.raises(InputError, match=part) as caught:
         so.Expression(0, text)
     assert "\n" not in str(caught.value)
     assert len(str(caught.value)) < 400
-    assert time.perf_counter() - begin < 2.0
+    assert time.process_time() - begin < 2.0
 
 
 def test_other_wrong_arguments():
