@@ -165,6 +165,7 @@ def test_limit_points_end_where_their_motions_become_symmetric():
         assert apart.min() < 0.2
 
 
+@pytest.mark.slow
 def test_a_system_that_is_symmetric_at_one_value_only_does_not_end_a_curve():
     """Stops at g**2 and g - 1 are mirror images at g = 0.618, where the limit points' motions are nearly symmetric."""
     stops = [
@@ -179,6 +180,7 @@ def test_a_system_that_is_symmetric_at_one_value_only_does_not_end_a_curve():
     assert ends == [pytest.approx((0.717156, 0.0), abs=1e-6), pytest.approx((0.798715, 0.0), abs=1e-6)]
 
 
+@pytest.mark.slow
 def test_behind_a_corner_no_other_part_of_the_curve_is_taken():
     """The only solution at a given height of the grazing lay far from it, on a part that led back to the start."""
     stops = [

@@ -207,6 +207,7 @@ def test_minimum_and_maximum_beside_a_cusp(stepping):
     assert cusp.omega < turn.omega
 
 
+@pytest.mark.slow
 def test_curves_of_extrema_keep_the_ranges_of_the_curve_that_they_lie_on():
     stop = so.ElasticStop(dof=0, stiffness=1.0, gap=0.3, side="left", regularization=500.0)
     system = so.System(1.0, "2*z", 0.3, [stop], [so.HarmonicLoad(0, "p")], {"z": 0.05, "p": 0.2})

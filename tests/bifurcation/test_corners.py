@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from slow import slow
 
 import suboctave as so
 
@@ -27,7 +28,7 @@ def test_a_rotor_that_meets_its_stator_jumps_where_the_orbit_reaches_the_clearan
     assert not any("could not be located" in note for note in curve.warnings)
 
 
-@pytest.mark.parametrize("omega", [(6.0, 0.4), (0.4, 6.0)])
+@pytest.mark.parametrize("omega", [(6.0, 0.4), *slow((0.4, 6.0))])
 def test_a_rotor_that_whirls_into_its_stator_and_out_of_it(omega):
     """The whole curve: contact begins everywhere at once, the curve turns there at the upper of the two frequencies."""
     touch = np.sqrt(np.sort(np.roots([1.0 - (0.05 / 0.2) ** 2, 0.1**2 - 2.0, 1.0])))

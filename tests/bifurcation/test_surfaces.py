@@ -71,6 +71,7 @@ def test_a_heavy_rotor_in_a_ring():
     assert all(event.agrees for event in check.bifurcations), check
 
 
+@pytest.mark.slow
 def test_unequal_bearings():
     curve = so.frequency_response(rotor(0.0, "1.1*k"), (0.84, 0.9), 21)
     assert [str(event.kind) for event in curve.bifurcations] == ["BP", "BP", "NS"]

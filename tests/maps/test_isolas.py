@@ -193,6 +193,7 @@ def test_an_isola_of_nonlinear_damping(damped, bounds):
     assert isola.at(0.5 * sum(isola.range)).closed
 
 
+@pytest.mark.slow
 def test_two_isolas_that_join():
     """They are told apart, each closed branch belongs to one of them, and it says where they join."""
     first, second = so.find_isolas(reference(p=1.7), (1.8, 4.5), "j", (0.3, 1.0), values=2)
@@ -359,6 +360,7 @@ def test_a_loop_between_pitchforks_of_the_response_is_no_isola(system, omega, bo
     assert isolas.limit_points
 
 
+@pytest.mark.slow
 def test_a_static_load_makes_such_a_loop_an_isola():
     """It takes the response over one half of the loop; the other one closes with what was the symmetric response.
 

@@ -127,6 +127,7 @@ def test_without_the_symmetry_there_is_no_image(loop):
     assert mirrored(orbit) is None
 
 
+@pytest.mark.slow
 def test_coexisting_mirror_images_are_counted_each(cubic):
     """Where the map has four stable motions, time integration from their states stays on four different ones."""
     regimes = so.regime_map(cubic, (1.25, 1.6), "F", (7.4, 7.6), depth=1, values=2)

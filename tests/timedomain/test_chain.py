@@ -79,6 +79,7 @@ def test_stored_bifurcations_are_found_again(entry):
     assert found.amplitude == pytest.approx(entry["amplitude_last_mass"], rel=1e-8)
 
 
+@pytest.mark.slow
 def test_search_in_the_wrong_direction_turns_back():
     """At 0.4335 the multipliers nearest to -1 are still a complex pair: secants lead away from the PD at 0.4343."""
     system = chain()
