@@ -72,6 +72,18 @@ def test_a_branch(stop, tmp_path):
     assert repr(again) == repr(check)
 
 
+def test_points_of_a_branch_whose_basis_grows_are_held_each_against_its_own():
+    """Little damping leaves the multipliers of vibrations beyond a basis, which are others in each, near the circle."""
+    mass, stiffness = chain_matrices(50)
+    load = [so.HarmonicLoad(49, 0.012)]
+    system = so.System(mass, so.ModalDamping(0.003), stiffness, [so.ElasticStop(49, 1.0, 0.5)], load)
+    curve = so.frequency_response(system, (1.1, 0.95))
+    modes = {point.orbit.state().linear.projected.shapes.shape[1] for point in curve.points}
+    assert len(modes) > 1
+    check = so.verify(curve, points=5, bifurcations=False)
+    assert check.agrees, check
+
+
 @pytest.mark.parametrize(
     "more",
     [

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import suboctave as so
+from suboctave.verification.motions import pairing
 
 
 def test_right_motions_agree(rattling_curve, duffing_curve):
@@ -100,3 +101,10 @@ def test_a_motion_too_unstable_to_be_shot_is_not_wrong():
     assert check.outcome == "cannot tell"
     assert "as large as the motion within its period" in check.reason
     assert so.verify(curve.points[0]).agrees
+
+
+def test_differences_of_multipliers_count_beyond_what_their_errors_cover():
+    mu, true = np.array([0.9, 0.2j, -0.2j]), np.array([-0.25j, 0.9, 0.25j])
+    assert pairing(mu, true) == pytest.approx(0.05)
+    for error, left in ((6e-3, 0.0), (1e-3, 0.04)):
+        assert pairing(mu, true, True, np.array([1e-6, error, error])) == pytest.approx(left)

@@ -30,6 +30,8 @@ from suboctave.verification.result import AGREES, DISAGREES, OPEN
 LOCATED = ("LP", "BP", "PD", "NS")
 #: how far along the curve of motions one is searched, in tolerances, and the passes through it that may be spent
 _REACH, _PASSES = 100.0, 120
+#: how many times their stated errors multipliers may be off
+_COVERED = 10.0
 #: share of a motion that its start in time may be off by, whatever its harmonics are
 _DIGITS = 1e-12
 #: displacements of a motion that are held in memory at once
@@ -122,7 +124,8 @@ def verify_motion(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: fl
     distance = max(distance_of(system, motion, start, solution), solution.residual)
     if isinstance(what, Bifurcation) and touches:
         distance = max(distance, distance_from_gap(system, what, solution.state, solution.omega))
-    error, off = (pairing(floquet.multipliers, solution.multipliers, relative) for relative in (False, True))
+    error = pairing(floquet.multipliers, solution.multipliers)
+    off = pairing(floquet.multipliers, solution.multipliers, True, floquet.errors)
 
     def verdict(agrees: bool, reason: str, otherwise: str = DISAGREES) -> Verification:
         outcome, found = AGREES if agrees else otherwise, recovered_solution(system, solution)
@@ -134,7 +137,7 @@ def verify_motion(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: fl
             words = f"Shooting sees multipliers cross as at {KINDS[kind].words} close to omega = {solution.omega:.9g}"
         same = distance <= tolerance
         if same and off > tolerance + floquet.error + 100.0 * distance:
-            words += f"; its multipliers are others (off by {off:.1e}, which their errors do not cover)"
+            words += f"; its multipliers are others (off by {error:.1e}, which their errors do not cover)"
         return verdict(same, words if same else f"{words}: another one (relative distance {distance:.1e})")
     if not distance <= tolerance:
         if not touches and distance <= left_out(motion):
@@ -154,8 +157,8 @@ def verify_motion(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: fl
         return verdict(False, f"Shooting calls it {other}, harmonic balance the opposite")
     if alone or isinstance(what, TrackedEvent):
         return verdict(True, "The same motion")
-    if off > tolerance + 10.0 * floquet.error + 100.0 * distance:
-        return verdict(False, f"Shooting finds other multipliers (off by {off:.1e}) with the same verdict")
+    if off > tolerance + _COVERED * floquet.error + 100.0 * distance:
+        return verdict(False, f"Shooting finds other multipliers (off by {error:.1e}) with the same verdict")
     return verdict(True, "The same motion, the same verdict")
 
 
@@ -281,14 +284,19 @@ def _by_shooting(system: System, item: Bifurcation, start: Array, tolerance: flo
         return shoot(system, start, omega, periods=periods)
 
 
-def pairing(computed: ComplexArray, true: ComplexArray, relative: bool = False) -> float:
-    """Largest difference between two sets of multipliers under the best pairing; `relative` to those beyond one."""
+def pairing(computed: ComplexArray, true: ComplexArray, relative: bool = False, errors: Array | None = None) -> float:
+    """Largest difference between two sets of multipliers under the best pairing; `relative` to those beyond one.
+
+    errors: of the computed ones; by how much the difference is more than what `_COVERED` times these cover.
+    """
     from scipy.optimize import linear_sum_assignment
 
     cost = np.abs(computed[:, None] - true[None, :])
     if relative:
         cost = cost / np.maximum(1.0, np.abs(true))
-    return float(cost[linear_sum_assignment(cost)].max(initial=0.0))
+    rows, columns = linear_sum_assignment(cost)
+    off = cost[rows, columns] if errors is None else cost[rows, columns] - _COVERED * errors[rows]
+    return float(off.max(initial=0.0))
 
 
 def motion_of(what: Any | BranchPoint | Bifurcation) -> PeriodicOrbit:

@@ -20,9 +20,10 @@ from suboctave.harmonic.basis import ComplexArray, HarmonicBasis
 from suboctave.harmonic.condensed import linear_part_of
 from suboctave.harmonic.energy import damping_ratio
 from suboctave.harmonic.evaluation import HarmonicBalance
-from suboctave.harmonic.linear_part import StructuralMatrices
+from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.model.projected import ProjectedSystem
+from suboctave.model.system import System
 from suboctave.projection import system_of_motions
 from suboctave.results.branch import Branch, TrackedBranch
 from suboctave.results.modes import ModeCurve
@@ -33,7 +34,7 @@ from suboctave.verification.motions import distance_of, largest_of
 
 @dataclass(frozen=True)
 class Shot:
-    """The true motion beside one of harmonic balance, if `converged`.
+    """The true motion beside one of harmonic balance, if `converged`, its state in the coordinates of `system`.
 
     A bifurcation lies `along` the curve of true motions from there, in units of the motion's size, at `omega_there`;
     nan where none of the kind lies within the distance that was looked at, or none was looked for.
@@ -47,6 +48,7 @@ class Shot:
     errors: Array
     along: float
     omega_there: float
+    system: System
 
 
 class Shots:
@@ -73,6 +75,8 @@ class Shots:
             self.unit = float(np.ptp(values) or np.abs(values).max() or 1.0)
         self.orbits = orbits
         self.system = system_of_motions(orbits)
+        #: the projections of single motions, by the linear parts that they were solved with
+        self._own: dict[LinearPart, System] = {}
         self.shooting = MultipleShooting(self.system, orbits[0].basis.nu, workers, free)
         self.single = isinstance(self.system, ProjectedSystem) and not self.alone
 
@@ -88,15 +92,20 @@ class Shots:
             yield from self._batch(orbits[begin:end], kinds[begin:end], reach)
 
     def _single(self, orbit: PeriodicOrbit) -> Shot:
-        start = self.system.reduced(orbit.start())
+        linear = orbit.state().linear
+        if linear not in self._own:
+            # a basis grows along a curve, and another one has other multipliers beyond the frequencies it is made for
+            self._own[linear] = system_of_motions([orbit])
+        system = self._own[linear]
+        start = system.reduced(orbit.start())
         try:
-            found = shoot(self.system, start, orbit.omega, orbit.basis.nu, orbit.values)
+            found = shoot(system, start, orbit.omega, orbit.basis.nu, orbit.values)
         except ConvergenceError:
             none = np.zeros(0, dtype=complex)
-            return Shot(False, math.inf, start, orbit.omega, none, none.real, math.nan, math.nan)
-        distance = distance_of(self.system, orbit, start, found)
+            return Shot(False, math.inf, start, orbit.omega, none, none.real, math.nan, math.nan, system)
+        distance = distance_of(system, orbit, start, found)
         doubt = np.full(len(found.multipliers), found.residual)
-        return Shot(True, distance, found.state, found.omega, found.multipliers, doubt, math.nan, found.omega)
+        return Shot(True, distance, found.state, found.omega, found.multipliers, doubt, math.nan, found.omega, system)
 
     def _batch(self, orbits: Sequence[PeriodicOrbit], kinds: Sequence[str], reach: float | None) -> list[Shot]:
         states, omega, parameters, sizes, held = self._starts(orbits)
@@ -123,7 +132,7 @@ class Shots:
             places = [_place(kind, [sides[0], middle, sides[1]], b, reach) for b, kind in enumerate(kinds)]
         return [
             Shot(bool(middle.converged[b]), float(distance[b]), middle.states[b, 0], float(middle.omega[b]),
-                 multipliers[b], errors[b], *place)
+                 multipliers[b], errors[b], *place, self.system)
             for b, place in enumerate(places)
         ]  # fmt: skip
 

@@ -27,7 +27,6 @@ from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.interruption import Interruption, limited
 from suboctave.kinds import KINDS
 from suboctave.model.projected import ProjectedSystem
-from suboctave.model.system import System
 from suboctave.progress import reporting
 from suboctave.results.branch import Branch
 from suboctave.results.modes import ON_CIRCLE, ModeCurve
@@ -107,7 +106,7 @@ def _verify_branch(
                 if report is not None:
                     report((len(which) + 4 * done) / whole, f"{item.kind} at omega = {item.omega:.6g}")
                 own = quick.get(len(which) + done)
-                confirmed.append(_confirmed(shots.system, item, own, tolerance, branch.observe))
+                confirmed.append(_confirmed(item, own, tolerance, branch.observe))
         except KeyboardInterrupt as cause:
             interruption = Interruption.of(cause)
     basis = shots.system.words if isinstance(shots.system, ProjectedSystem) else ""
@@ -142,7 +141,7 @@ def _judged(branch: Branch, i: int, shot: Shot, tolerance: float) -> VerifiedPoi
     """The verdict on one point."""
     point = branch.points[i]
     floquet, distance, multipliers = point.floquet, shot.distance, shot.multipliers
-    stable, error, known = None, math.inf, floquet.applicable
+    stable, error, off, known = None, math.inf, math.inf, floquet.applicable
     computed = branch.stable_at(point)
     if not shot.converged:
         outcome, reason = OPEN, "Shooting did not arrive at a motion from here"
@@ -158,10 +157,10 @@ def _judged(branch: Branch, i: int, shot: Shot, tolerance: float) -> VerifiedPoi
         if known:
             own = floquet.multipliers
             kept = branch.deciding(point, own)
-            error = pairing(own[kept], multipliers[deciding], relative=True)
             # critical ones that meet part like a root of what is missed
-            critical = np.count_nonzero(~kept) or 1
-            error = max(error, pairing(own[~kept], multipliers[~deciding]) ** critical)
+            meeting = pairing(own[~kept], multipliers[~deciding]) ** (np.count_nonzero(~kept) or 1)
+            error = max(meeting, pairing(own[kept], multipliers[deciding], relative=True))
+            off = max(meeting, pairing(own[kept], multipliers[deciding], True, floquet.errors[kept]))
         if tolerance < distance <= left_out(point.orbit):
             outcome, reason = OPEN, up_to_harmonics(point.orbit, distance)
         elif distance > tolerance:
@@ -176,7 +175,7 @@ def _judged(branch: Branch, i: int, shot: Shot, tolerance: float) -> VerifiedPoi
         elif computed != stable:
             verdict = "stable" if stable else "unstable"
             outcome, reason = DISAGREES, f"Shooting calls it {verdict}, harmonic balance the opposite"
-        elif error > allowed:
+        elif off > allowed:
             outcome, reason = DISAGREES, f"Shooting finds other multipliers (off by {error:.1e}) with the same verdict"
         else:
             outcome, reason = AGREES, "The same motion, the same verdict"
@@ -205,13 +204,11 @@ def _named(item: Bifurcation) -> str:
     return "extremum of omega" if item.kind == "extremum" else KINDS[item.kind].words
 
 
-def _confirmed(
-    system: System, item: Bifurcation, shot: Shot | None, tolerance: float, observe: int
-) -> VerifiedBifurcation:
+def _confirmed(item: Bifurcation, shot: Shot | None, tolerance: float, observe: int) -> VerifiedBifurcation:
     verdict = partial(VerifiedBifurcation, item.kind, item.omega, item.parameters, item.orbit.amplitude(observe))
     if shot is not None and shot.converged and shot.distance <= tolerance:
         if item.kind in CONTACT_KINDS:
-            along = distance_from_gap(system.moved_to(item.orbit.values), item, shot.state, shot.omega)
+            along = distance_from_gap(shot.system.moved_to(item.orbit.values), item, shot.state, shot.omega)
             words = "The same motion, and it just reaches the gap"
         else:
             along, words = abs(shot.along), f"Shooting finds {_named(item)} at omega = {shot.omega_there:.9g}"
