@@ -72,6 +72,13 @@ def test_same_normal_forms(full, condensed_branch):
     assert compared
 
 
+def test_a_branch_that_leaves_has_the_unknowns_of_its_parent(full, condensed_branch):
+    branches = [so.switch_branch(response.bifurcations["PD"][0]) for response in (full, condensed_branch)]
+    assert [branch.points[0].orbit.x.shape[1] for branch in branches] == [N, 1]
+    one, other = ([(b.kind, round(b.omega, 7)) for b in branch.bifurcations] for branch in branches)
+    assert one == other
+
+
 @pytest.mark.parametrize("parameter", ["p", "Kc"])
 def test_same_curves_of_bifurcations(full, condensed_branch, parameter):
     """In two parameters, with the same extrema and points of codimension two on the way."""

@@ -221,6 +221,17 @@ def test_an_interruption_keeps_what_is_finished():
     assert np.isnan(motions.end[~motions.finished]).all()
 
 
+@pytest.mark.parametrize("speed", [-3e-5, -3e-6, 3e-5])
+@pytest.mark.parametrize("side", [0.0, 1.0])
+def test_a_trajectory_within_rounding_of_a_contact_goes_on(speed, side):
+    """The way to the gap is less than the last digit of either displacement: no step leads there."""
+    gap = np.nextafter(8.15 - 8.0, side)
+    stop, load = so.ElasticStop((0, 1), 2.0, gap), so.HarmonicLoad(0, 0.1)
+    flow = Flow(so.System(np.eye(2), 0.1 * np.eye(2), 0.1 * np.eye(2), [stop], [load]))
+    at, beside = (flow.over([[8.15 + off, 8.0, speed, 0.0]], 1.0, 1).checked().end for off in (0.0, 1e-9))
+    assert at == pytest.approx(beside, abs=1e-8)
+
+
 @pytest.mark.parametrize("method", ["accurate", "newmark"])
 def test_what_grows_without_bound_is_told(method):
     if method == "accurate":

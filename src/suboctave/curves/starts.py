@@ -35,7 +35,7 @@ from suboctave.harmonic.assembly import apply_blocks, block_diagonal
 from suboctave.harmonic.basis import HarmonicBasis, spectrum_to_real
 from suboctave.harmonic.condensed import linear_part_of
 from suboctave.harmonic.evaluation import BalanceState, HarmonicBalance
-from suboctave.harmonic.linear_part import LinearPart, StructuralMatrices
+from suboctave.harmonic.linear_part import LinearPart
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.truncation import AdaptiveHarmonics
 from suboctave.lazy import lazy
@@ -109,11 +109,9 @@ def check_unknowns(size: int, basis: HarmonicBasis) -> None:
         )
 
 
-def own_linear_part(orbit: PeriodicOrbit, system: System | None = None) -> LinearPart | None:
-    """The linear part an orbit was solved with, at its or a system's parameters; None for its system's own matrices."""
-    linear = orbit.balance.linear
-    values = orbit.values if system is None else dict(system.parameters)
-    return None if isinstance(linear, StructuralMatrices) else linear.rebuilt(values)
+def own_linear_part(orbit: PeriodicOrbit, system: System | None = None) -> LinearPart:
+    """The linear part an orbit was solved with, at its or a system's parameters."""
+    return orbit.balance.linear.rebuilt(orbit.values if system is None else dict(system.parameters))
 
 
 _PATH = "path from a heavily damped linear structure"

@@ -135,6 +135,9 @@ def _cut(c, at, n, corners, h, period, measure):
             landed = i
             continue
         m0, d0 = sign * c[at[_G] + i], sign * c[at[_DG] + i]
+        if 0.0 < m0 <= -_LANDED * period * d0:
+            # the last step has landed just short of it: by rounding no shorter one might come closer
+            m0 = 0.0
         if m1 >= 0.0 and d1 >= 0.0 and d0 >= 0.0:
             continue
         x = _first_root(m0, h * d0, m1, h * d1)

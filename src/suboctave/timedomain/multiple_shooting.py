@@ -182,6 +182,8 @@ class MultipleShooting:
                 t *= np.where(np.sum(t * along[now], axis=1) < 0.0, -1.0, 1.0)[:, None]
             tangent[now] = t
             border[now] = np.linalg.slogdet(np.concatenate([jacobian, t[:, None, :]], axis=1))[0]
+            # a neighbour may not be followed
+            converged[now] = np.isfinite(whole[now] + rough[now]).all(axis=(1, 2))
         return ShotMotions(y, tail[:, 0], tail[:, 1:], converged, residual, tangent, border, whole, rough)
 
     def _linearised(

@@ -102,7 +102,7 @@ def curve_through(
     spans = tuple(abs(float(high) - float(low)) or 1.0 for low, high in ends)
     equations = _equations(item, names, formulation)
     linear, x = own_linear_part(orbit), orbit.x
-    if linear is not None and equations.reads_observed:
+    if equations.reads_observed:
         linear = linear.holding(item.context["observe"])
         x = linear.read(orbit.coefficients)
     x = orbit.basis.resized(x, basis)
