@@ -27,7 +27,7 @@ from suboctave.model.system import System
 from suboctave.projection import system_of_motions
 from suboctave.results.branch import Branch, TrackedBranch
 from suboctave.results.modes import ModeCurve
-from suboctave.timedomain import shoot
+from suboctave.timedomain import shoot_along
 from suboctave.timedomain.multiple_shooting import MultipleShooting, ShotMotions
 from suboctave.verification.motions import distance_of, largest_of
 
@@ -55,7 +55,7 @@ class Shots:
     """Multiple shooting from motions of one curve, which have one period.
 
     Its differences take four trajectories for every coordinate and piece: responses of projected structures, with
-    dozens of coordinates, are shot at once over the period, at the motion's frequency.
+    dozens of coordinates, are shot at once over the period.
     """
 
     def __init__(self, branch: Branch, orbits: Sequence[PeriodicOrbit], workers: int | None = None) -> None:
@@ -99,7 +99,7 @@ class Shots:
         system = self._own[linear]
         start = system.reduced(orbit.start())
         try:
-            found = shoot(system, start, orbit.omega, orbit.basis.nu, orbit.values)
+            found = shoot_along(system, start, orbit.omega, orbit.basis.nu, orbit.values)
         except ConvergenceError:
             none = np.zeros(0, dtype=complex)
             return Shot(False, math.inf, start, orbit.omega, none, none.real, math.nan, math.nan, system)
