@@ -141,7 +141,7 @@ def _judged(branch: Branch, i: int, shot: Shot, tolerance: float) -> VerifiedPoi
     """The verdict on one point."""
     point = branch.points[i]
     floquet, distance, multipliers = point.floquet, shot.distance, shot.multipliers
-    stable, error, off, known = None, math.inf, math.inf, floquet.applicable
+    stable, error, off, known, undecided = None, math.inf, math.inf, floquet.applicable, False
     computed = branch.stable_at(point)
     if not shot.converged:
         outcome, reason = OPEN, "Shooting did not arrive at a motion from here"
@@ -161,6 +161,7 @@ def _judged(branch: Branch, i: int, shot: Shot, tolerance: float) -> VerifiedPoi
             meeting = pairing(own[~kept], multipliers[~deciding]) ** (np.count_nonzero(~kept) or 1)
             error = max(meeting, pairing(own[kept], multipliers[deciding], relative=True))
             off = max(meeting, pairing(own[kept], multipliers[deciding], True, floquet.errors[kept]))
+            undecided = bool(floquet.open[kept].any())
         if tolerance < distance <= left_out(point.orbit):
             outcome, reason = OPEN, up_to_harmonics(point.orbit, distance)
         elif distance > tolerance:
@@ -172,6 +173,8 @@ def _judged(branch: Branch, i: int, shot: Shot, tolerance: float) -> VerifiedPoi
         elif computed != stable and abs(margin) <= max(tolerance, doubt):
             near = f"the largest multiplier lies {abs(margin):.1e} from the unit circle"
             outcome, reason = OPEN, f"The same motion; {near}, too near to compare verdicts"
+        elif computed != stable and undecided:
+            outcome, reason = OPEN, "The same motion; harmonic balance has a multiplier within its error of the circle"
         elif computed != stable:
             verdict = "stable" if stable else "unstable"
             outcome, reason = DISAGREES, f"Shooting calls it {verdict}, harmonic balance the opposite"
