@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 import suboctave as so
+from suboctave.errors import ConvergenceError
+from suboctave.verification import motions
 from suboctave.verification.motions import pairing
 
 
@@ -108,3 +110,16 @@ def test_differences_of_multipliers_count_beyond_what_their_errors_cover():
     assert pairing(mu, true) == pytest.approx(0.05)
     for error, left in ((6e-3, 0.0), (1e-3, 0.04)):
         assert pairing(mu, true, True, np.array([1e-6, error, error])) == pytest.approx(left)
+
+
+def test_where_the_search_loses_a_branch_point_multipliers_that_cross_beside_it_tell(duffing_curve, monkeypatch):
+    def lost(*given, **options):
+        raise ConvergenceError("lost")
+
+    monkeypatch.setattr(motions, "locate_by_shooting", lost)
+    (point,) = so.frequency_response(so.library.duffing(c=0.05, F=1.4261375), (0.9, 0.78)).bifurcations["BP"]
+    check = so.verify(point)
+    assert check.agrees
+    assert "sees multipliers cross as at branch point" in check.reason
+    # at a limit point there are no motions on one side
+    assert not so.verify(duffing_curve.bifurcations["LP"][0]).agrees

@@ -274,12 +274,11 @@ def _by_shooting(system: System, item: Bifurcation, start: Array, tolerance: flo
             system, item.kind, start, omega, periods=periods, reach=reach, budget=_PASSES, multiplicity=several
         )
     except ConvergenceError:
-        crossing = {"PD": 1, "NS": 2}.get(item.kind)
-        if crossing is None:
+        if item.kind == "LP":
             raise
         sides = [shoot(system, start, omega * (1.0 + s * 0.1 * tolerance), periods=periods) for s in (-1.0, 1.0)]
         counts = [int(np.count_nonzero(np.abs(side.multipliers) > 1.0)) for side in sides]
-        if abs(counts[1] - counts[0]) != several * crossing:
+        if abs(counts[1] - counts[0]) != several * (2 if item.kind == "NS" else 1):
             raise
         return shoot(system, start, omega, periods=periods)
 
