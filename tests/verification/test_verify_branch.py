@@ -77,14 +77,17 @@ def test_wrong_multipliers_are_found(duffing_curve, to):
     assert ("the opposite" if to > 1.0 else "other multipliers") in bad.reason
 
 
-def test_verdicts_that_the_branch_leaves_open_are_not_compared(duffing_curve):
-    """The wrong verdict once more, of multipliers that may be off by as much."""
+@pytest.mark.parametrize(
+    ("errors", "outcome"), [((0.25, 0.25), "cannot tell"), ((0.15, 0.15), "disagrees"), ((0.25, 0.15), "disagrees")]
+)
+def test_verdicts_that_the_branch_leaves_open_are_not_compared(duffing_curve, errors, outcome):
+    """The wrong verdict once more, of multipliers that may be off by as much, or one of which is not."""
     floquet = duffing_curve.points[30].floquet
     scaled = floquet.multipliers * (1.2 / np.abs(floquet.multipliers).max())
-    for error, outcome in ((0.25, "cannot tell"), (0.15, "disagrees")):
-        known = replace(floquet, multipliers=scaled, errors=np.full(len(scaled), error))
-        (point,) = so.verify(planted(duffing_curve, 30, known=known), points=[30], bifurcations=False).points
-        assert point.outcome == outcome
+    assert np.abs(scaled) == pytest.approx(1.2)
+    known = replace(floquet, multipliers=scaled, errors=np.array(errors))
+    (point,) = so.verify(planted(duffing_curve, 30, known=known), points=[30], bifurcations=False).points
+    assert point.outcome == outcome
 
 
 def test_verdicts_too_near_to_the_circle_are_not_compared(duffing_curve):

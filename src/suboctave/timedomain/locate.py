@@ -98,8 +98,8 @@ class Curve:
             floor = self.tol * max(1.0, size[0])
             # At the floor one more step still brings digits of omega, unless the last one brought none.
             if residual <= (floor if residual > 0.1 * previous else 0.01 * floor):
-                # where other curves cross, of all directions that of the curve: the one ahead, or at first the one in
-                # which eta changes, as it does in none that a symmetry tells from the curve
+                # where other curves cross the direction is that of several which lies nearest to the one ahead, or at
+                # first to that of eta
                 null = right[np.count_nonzero(keep) :]
                 tangent = null.T @ (null @ (np.eye(1, self.m + 1, self.m)[0] if along is None else along))
                 whole = float(np.linalg.norm(tangent))
@@ -174,6 +174,7 @@ def locate_by_shooting(
     if kind not in _KINDS:
         raise InputError(f"unknown kind of bifurcation {kind!r}{suggest(str(kind), _KINDS)}")
     periods, dof = check_count("periods", periods), observed_dof(system, observe)
+    multiplicity = check_count("multiplicity", multiplicity)
     model, start = _in_its_size(system, state, omega, values, periods)
     curve = Curve(model, periods, rtol, tol, kind == "BP", budget)
     point = curve.onto(start, None)

@@ -75,8 +75,8 @@ class Shots:
             self.unit = float(np.ptp(values) or np.abs(values).max() or 1.0)
         self.orbits = orbits
         self.system = system_of_motions(orbits)
-        #: the projections of single motions, by the linear parts that they were solved with
-        self._own: dict[LinearPart, System] = {}
+        #: the last projection of a single motion, and the linear part that it was solved with
+        self._own: tuple[LinearPart, System] | None = None
         self.shooting = MultipleShooting(self.system, orbits[0].basis.nu, workers, free)
         self.single = isinstance(self.system, ProjectedSystem) and not self.alone
 
@@ -93,10 +93,10 @@ class Shots:
 
     def _single(self, orbit: PeriodicOrbit) -> Shot:
         linear = orbit.state().linear
-        if linear not in self._own:
+        if self._own is None or self._own[0] is not linear:
             # a basis grows along a curve, and another one has other multipliers beyond the frequencies it is made for
-            self._own[linear] = system_of_motions([orbit])
-        system = self._own[linear]
+            self._own = linear, system_of_motions([orbit])
+        system = self._own[1]
         start = system.reduced(orbit.start())
         try:
             found = shoot_along(system, start, orbit.omega, orbit.basis.nu, orbit.values)

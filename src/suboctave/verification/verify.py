@@ -161,7 +161,9 @@ def _judged(branch: Branch, i: int, shot: Shot, tolerance: float) -> VerifiedPoi
             meeting = pairing(own[~kept], multipliers[~deciding]) ** (np.count_nonzero(~kept) or 1)
             error = max(meeting, pairing(own[kept], multipliers[deciding], relative=True))
             off = max(meeting, pairing(own[kept], multipliers[deciding], True, floquet.errors[kept]))
-            undecided = bool(floquet.open[kept].any())
+            # one outside the circle by more than its error decides, whatever the others do
+            outside = np.abs(own[kept]) - 1.0 > floquet.errors[kept]
+            undecided = bool(floquet.open[kept].any() and not outside.any())
         if tolerance < distance <= left_out(point.orbit):
             outcome, reason = OPEN, up_to_harmonics(point.orbit, distance)
         elif distance > tolerance:
