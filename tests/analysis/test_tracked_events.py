@@ -46,7 +46,7 @@ def beside(point, way, heading, place):
     along = point.tangent * math.copysign(1.0, heading * point.tangent[-2])
     row = point.weights * along
     solved = correct(point.curve, point.u + way * along, row / length(row), point.weights, OPTIONS)
-    return Sample(make_point(solved, point.curve, along, place))
+    return Sample(make_point(solved, along, place))
 
 
 @pytest.mark.parametrize("heading", [1.0, -1.0], ids=["up", "down"])

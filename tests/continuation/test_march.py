@@ -79,7 +79,7 @@ def solve_at(curve, u):
 
 
 def start(curve, x, p):
-    return make_point(solve_at(curve, np.array([x, p])), curve, None, 0.0)
+    return make_point(solve_at(curve, np.array([x, p])), None, 0.0)
 
 
 def march(curve, x, p, direction, bounds, inspect=None, **stepping):

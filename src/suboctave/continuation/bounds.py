@@ -141,4 +141,4 @@ class Bounds(Range):
         guess[index] = bound
         solved = correct(b.curve, guess, index, b.weights, newton)
         arclength = a.arclength + distance(solved.u, b.curve.transfer(a.u, a.curve), b.weights)
-        return make_point(solved, b.curve, b.tangent, arclength)
+        return make_point(solved, b.tangent, arclength)

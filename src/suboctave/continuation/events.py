@@ -107,7 +107,7 @@ class Bracket:
                 continue
             off = length(weights * solved.u - (1.0 - share) * self._ends[0] - share * self._ends[1])
             if off <= _ELSEWHERE * (end - start):
-                return make_point(solved, curve, ahead, arclength)
+                return make_point(solved, ahead, arclength)
             failure = ConvergenceError(f"Newton's method left the curve for {curve.where(solved.u)}")
         raise failure
 

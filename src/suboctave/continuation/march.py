@@ -315,7 +315,7 @@ class March:
                 if bound is not None:
                     solved.u[curve.parameter] = bound
                 taken = distance(solved.u, point.u, point.weights)
-                new = make_point(solved, curve, point.tangent, point.arclength + taken)
+                new = make_point(solved, point.tangent, point.arclength + taken)
                 turn = _angle(point, new)
                 if step <= options.min_step:
                     # not at a jump across a corner, onto the part of the curve behind it, to be followed back into it
@@ -343,7 +343,7 @@ class March:
             order = max(1, order - 1)
             step = max(0.5 * step, options.min_step)
 
-    def _solved(self, curve: Curve, guess: Array, row: Array | int, weights: Array, step: float) -> Solved:
+    def _solved(self, curve: Curve, guess: Array, row: Array | int, weights: Array, step: float) -> Solved[Curve]:
         """The point beside a prediction; of a short step, or where the curve asks for it, more closely: what the
         tolerance leaves open may be as long as the step, or as a sharp turn is wide.
         """
@@ -398,7 +398,7 @@ class March:
             try:
                 solved = correct(curve, guess, row, weights, self.newton)
                 taken = distance(solved.u, point.u, weights)
-                new = make_point(solved, curve, heading * row, point.arclength + taken)
+                new = make_point(solved, heading * row, point.arclength + taken)
             except ConvergenceError:
                 nearer = None
                 continue

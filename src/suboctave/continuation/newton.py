@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -72,10 +73,18 @@ class NewtonOptions:
             )
 
 
-@dataclass(eq=False, slots=True)
-class Solved:
-    """A converged point. `factor` is the LU of the scaled bordered Jacobian at u: columns divided by `weights`."""
+#: the equations that a point solves
+Equations = TypeVar("Equations", bound=Problem)
+Equations_co = TypeVar("Equations_co", bound=Problem, covariant=True)
 
+
+@dataclass(eq=False, slots=True)
+class Solved(Generic[Equations_co]):
+    """A converged point of `curve`, in whose discretisation u, the evaluation and the weights are. `factor` is the LU
+    of the scaled bordered Jacobian at u: columns divided by `weights`.
+    """
+
+    curve: Equations_co
     u: Array
     evaluation: Evaluation
     weights: Array
@@ -100,14 +109,14 @@ def factorised(evaluation: Evaluation, row: Array | None, weights: Array) -> Fac
 
 
 def correct(
-    curve: Problem,
+    curve: Equations,
     guess: Array,
     row: Array | int | None,
     weights: Array,
     options: NewtonOptions,
     known: Factor | None = None,
     spare: float = 0.0,
-) -> Solved:
+) -> Solved[Equations]:
     """Solve `F(u) = 0`, `row . (weights * (u - guess)) = 0`, starting from the guess.
 
     Parameters
@@ -127,7 +136,7 @@ def correct(
     plane = np.eye(1, len(guess), row)[0] if isinstance(row, int) else row
     u, last, factor = guess.copy(), None, known
     way, before, contraction, first, previous = 0.0, 0.0, 0.0, 0.0, math.inf
-    nearest: Solved | None = None
+    nearest: Solved[Equations] | None = None
     for iteration in range(options.iterations + 1):
         check_time()
         evaluation = curve.evaluate(u)
@@ -141,7 +150,7 @@ def correct(
             takes_over: Callable[[Evaluation], bool] | None = getattr(evaluation, "takes_over", None)
             if factor is None or last is None or way > spare or takes_over is None or not takes_over(last):
                 factor = factorised(evaluation, plane, weights)
-            return Solved(u, evaluation, weights, factor, iteration, distance(u, guess, weights))
+            return Solved(curve, u, evaluation, weights, factor, iteration, distance(u, guess, weights))
         if iteration == options.iterations:
             break
         # after a short step that contracts, the old factors take the next one as far; where that is not far enough, new
@@ -158,7 +167,7 @@ def correct(
             step[row] = 0.0  # but for rounding of the factors it is
         still = options.rounding and previous <= options.correction and length(step) <= _ROUNDING
         if still and (nearest is None or error < nearest.evaluation.error):
-            nearest = Solved(u, evaluation, weights, factor, iteration, distance(u, guess, weights))
+            nearest = Solved(curve, u, evaluation, weights, factor, iteration, distance(u, guess, weights))
         share = _decrease(curve, u, step / weights, error) if options.damped else options.share(step)
         u, size = u - share * step / weights, length(step)
         way, before = way + share * size, error
@@ -193,7 +202,7 @@ def _decrease(curve: Problem, u: Array, step: Array, error: float) -> float:
     return 1.0
 
 
-def tangent(solved: Solved) -> Array:
+def tangent(solved: Solved[Equations]) -> Array:
     """Unit tangent in u, normalised in scaled arclength, oriented along the row the point was solved with."""
     rhs = np.zeros(len(solved.u))
     rhs[-1] = 1.0

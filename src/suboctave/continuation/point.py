@@ -39,7 +39,7 @@ class CurvePoint:
         return replace(self, tangent=-self.tangent, orientation=-self.orientation)
 
 
-def make_point(solved: Solved, curve: Curve, along: Array | None, arclength: float) -> CurvePoint:
+def make_point(solved: Solved[Curve], along: Array | None, arclength: float) -> CurvePoint:
     """A solved point with its tangent; `along` (in u) orients it, default: as the row it was solved with."""
     t = tangent(solved)
     sign = solved.factor.sign
@@ -47,9 +47,8 @@ def make_point(solved: Solved, curve: Curve, along: Array | None, arclength: flo
     # F_u, so that det [F_u; row] = (row . t) det [F_u; t], and the tangent came out with row . t > 0
     if along is not None and cosine(t, along, solved.weights) < 0.0:
         t, sign = -t, -sign
-    return CurvePoint(
-        curve, solved.u, t, solved.weights, solved.evaluation, sign, arclength, solved.iterations, solved.factor
-    )
+    s = solved
+    return CurvePoint(s.curve, s.u, t, s.weights, s.evaluation, sign, arclength, s.iterations, s.factor)
 
 
 def between(a: CurvePoint, b: CurvePoint, fraction: float) -> Array:
@@ -85,7 +84,7 @@ def point_between(
         if not exactly:
             raise
         solved = correct(b.curve, guess, row, b.weights, newton)
-    return make_point(solved, b.curve, chord, a.arclength + fraction * (b.arclength - a.arclength))
+    return make_point(solved, chord, a.arclength + fraction * (b.arclength - a.arclength))
 
 
 def point_ahead(point: CurvePoint, way: float, newton: NewtonOptions) -> CurvePoint:
@@ -93,7 +92,7 @@ def point_ahead(point: CurvePoint, way: float, newton: NewtonOptions) -> CurvePo
     curve, weights, along = point.curve, point.weights, point.tangent
     row = weights * along
     solved = correct(curve, point.u + way * along, row / length(row), weights, newton)
-    return make_point(solved, curve, along, point.arclength + way)
+    return make_point(solved, along, point.arclength + way)
 
 
 def solved_again(
@@ -104,7 +103,7 @@ def solved_again(
     """
     u, along = curve.transfer(point.u, point.curve), curve.transfer(point.tangent, point.curve)
     row = weights * along
-    return make_point(correct(curve, u, row / length(row), weights, newton, spare=spare), curve, along, point.arclength)
+    return make_point(correct(curve, u, row / length(row), weights, newton, spare=spare), along, point.arclength)
 
 
 def crossing_matrix(point: CurvePoint) -> Array:

@@ -70,7 +70,7 @@ def beyond_corner(
             if length(away) < _NEAR and length(away / length(away) + along) > _BACK:
                 # behind a corner the extremum moves on from the gap; what led there may be most of the way
                 ahead = math.copysign(1.0, rise) * row / point.weights
-                new = make_point(solved, curve, ahead, point.arclength + length(away))
+                new = make_point(solved, ahead, point.arclength + length(away))
                 return new, f"the curve has a corner at {where}, where {label} grazes"
         except ConvergenceError:
             continue

@@ -305,7 +305,7 @@ def _solved_beside(curve: MotionProblem, u: Array, way: Array, weights: Array, n
     solved = correct(curve, u + way, row / length(row), weights, newton)
     if not 0.5 <= length(weights * (solved.u - u)) / length(row) <= 2.0:
         raise ConvergenceError("what was found lies elsewhere")
-    return make_point(solved, curve, way, 0.0)
+    return make_point(solved, way, 0.0)
 
 
 def _near(point: CurvePoint, multipliers: ComplexArray) -> bool:

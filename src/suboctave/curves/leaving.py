@@ -125,7 +125,7 @@ def first_beside(curve: MotionProblem, u: Array, weights: Array, way: Array) -> 
     for distance in _FIRST:
         with suppress(ConvergenceError):
             solved = correct(curve, u + distance * way, weights * way, weights, _NEWTON)
-            point = make_point(solved, curve, way, 0.0)
+            point = make_point(solved, way, 0.0)
             mu = floquet_multipliers(curve.balance.at(*curve.split(point.u))).multipliers
             if length(weights * (point.u - u)) > _FAR * distance:
                 continue

@@ -129,7 +129,7 @@ def beside_branch_point(curve: Curve, u: Array, direction: Array, weights: Array
     for distance in _DISTANCES:
         try:
             solved = correct(curve, u + distance * direction, row, weights, newton)
-            point = make_point(solved, curve, direction, 0.0)
+            point = make_point(solved, direction, 0.0)
         except ConvergenceError:
             continue
         way = length(weights * (solved.u - u))

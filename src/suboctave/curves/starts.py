@@ -253,7 +253,10 @@ def settled(
     newton: NewtonOptions,
     held: Held = lambda curve, u, weights: curve.parameter,
 ) -> CurvePoint:
-    """Solve from a guess, as a rule at its parameter value; again with more harmonics while the motion asks."""
+    """Solve from a guess, as a rule at its parameter value; again with more harmonics while the motion asks, or once
+    with fewer. Where fewer have not been enough none are taken away again.
+    """
+    fewest = 0
     for _ in range(12):
         balance = curve.balance.settle(*curve.split(u))
         if balance is not curve.balance:
@@ -263,10 +266,13 @@ def settled(
         adapted = curve.adapted(solved.u, solved.evaluation)
         # a guess at rest has no units for a motion
         measured = curve.size(u) > 0.0 or not curve.size(solved.u) > 0.0
-        if adapted.balance is curve.balance and measured:
+        present, wanted = curve.balance.basis.harmonics, adapted.balance.basis.harmonics
+        if measured and (adapted.balance is curve.balance or wanted < fewest):
             break
+        if wanted > present:
+            fewest = wanted
         u, curve = adapted.transfer(solved.u, curve), adapted
-    return make_point(solved, curve, None, 0.0)
+    return make_point(solved, None, 0.0)
 
 
 def _from_given(curve: MotionProblem, value: float, given: Any) -> Array:
@@ -395,7 +401,7 @@ def _released(curve: MotionProblem, value: float, newton: NewtonOptions) -> tupl
     u = problem.first()
     # the size of this motion, not of a linear response that a free body or a resonance makes large
     problem = _Held.of(_like(curve, curve.adaptive, curve.size(u)), value)
-    point = make_point(correct(problem, u, problem.parameter, problem.weights(u, 0.0), newton), problem, None, 0.0)
+    point = make_point(correct(problem, u, problem.parameter, problem.weights(u, 0.0), newton), None, 0.0)
     # where the orientation changes a step may have gone over to another path
     march = March(point, 1.0, (0.0, 1.0), newton, _STEPPING, lambda a, b: a.orientation == b.orientation)
     # of all its points the last alone is kept: with many harmonics the matrices of hundreds would fill the memory

@@ -74,7 +74,7 @@ def nearest_point(
     """
     row = null_row(curve, u, weights) if along is None else weights * along / length(weights * along)
     try:
-        return make_point(correct(curve, u, row, weights, newton, spare=spare), curve, row / weights, 0.0)
+        return make_point(correct(curve, u, row, weights, newton, spare=spare), row / weights, 0.0)
     except ConvergenceError:
         if along is not None:
             raise
@@ -86,7 +86,7 @@ def nearest_point(
             break
         u = u - factor.solve(np.append(evaluation.residual, 0.0)) / weights
         row = null_row(curve, u, weights)
-    return make_point(correct(curve, u, row, weights, newton), curve, row / weights, 0.0)
+    return make_point(correct(curve, u, row, weights, newton), row / weights, 0.0)
 
 
 def zero_along(
@@ -126,7 +126,7 @@ def zero_along(
             guess = start.u + s * row / weights
             continue
         factor = solved.factor
-        last = make_point(solved, curve, start.tangent, start.arclength + s)
+        last = make_point(solved, start.tangent, start.arclength + s)
         sample = Sample(last)
         value = function(sample)
         if value == value_old and value != 0.0:
