@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
 import importlib.util
 import json
 import os
 import pickle
+import signal
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -112,16 +114,74 @@ def test_a_kernel_is_compiled_anew_when_another_file_that_it_calls_has_changed(t
 def test_what_another_version_has_left_in_the_cache_does_no_harm(made, tmp_path):
     """Not even where it names a class that is no more."""
     made()(VALUES)
-    written = list((tmp_path / "cache").rglob("*total*.nbi"))
-    assert written
+    written = list((tmp_path / "cache").rglob("*total*.nb?"))
+    assert len(written) == 2
     for path in written:
-        with open(path, "rb") as file:
-            version = pickle.load(file)
-        with open(path, "wb") as file:
-            pickle.dump(version, file)
-            file.write(b"csuboctave.compiled\nNoSuchClass\n.")
+        block = pickle.dumps(None)[:-1] + b"csuboctave.compiled\nNoSuchClass\n."
+        path.write_bytes(hashlib.blake2b(block, digest_size=16).digest() + block)
     assert made()(VALUES) == 30.0
     assert made()(VALUES) == 30.0
+
+
+def damaged(path: Path, how: str) -> None:
+    """Spoil a file."""
+    whole = path.read_bytes()
+    if how == "one bit":
+        at = len(whole) * 3 // 4
+        path.write_bytes(whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1 :])
+    elif how == "unreadable":
+        path.unlink()
+        path.mkdir()
+    else:
+        path.write_bytes({"truncated": whole[: len(whole) // 2], "garbage": b"garbage\n" * 9, "empty": b""}[how])
+
+
+@pytest.mark.parametrize("how", ["truncated", "garbage", "empty", "one bit", "unreadable"])
+@pytest.mark.parametrize("suffix", [".nbi", ".nbc"])
+def test_what_is_damaged_in_the_cache_is_compiled_anew(made, tmp_path, suffix, how):
+    """One bit of machine code too, which would compute something else."""
+    made()(VALUES)
+    files = list((tmp_path / "cache").rglob(f"*{suffix}"))
+    assert files
+    for path in files:
+        damaged(path, how)
+    assert made()(VALUES) == 30.0
+    if how != "unreadable":  # the cache is whole again
+        total = made()
+        assert total(VALUES) == 30.0
+        assert sum(total.stats.cache_hits.values()) == 1
+
+
+def test_a_disk_that_takes_nothing_more_costs_the_cache_alone(made, capsys, monkeypatch):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(caching.IndexDataCacheFile, "_open_for_write", full)
+    assert made()(VALUES) == 30.0
+    assert "NUMBA_CACHE_DIR" in capsys.readouterr().err
+
+
+def test_ctrl_c_waits_for_the_compiler_and_is_a_keyboard_interrupt(made):
+    """Raised in the middle of a compilation it would leave the compiler useless, or come out as a SystemError."""
+    total, handled = made(), []
+
+    def interrupt(*_):
+        handled.append(None)
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGINT, interrupt)
+    alarm = signal.signal(signal.SIGALRM, lambda *_: signal.raise_signal(signal.SIGINT))
+    signal.setitimer(signal.ITIMER_REAL, 0.02)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            total(VALUES)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, alarm)
+        assert signal.signal(signal.SIGINT, before) is interrupt
+    assert handled
+    assert total(VALUES) == 30.0
+    assert made()(np.arange(5)) == 30.0
 
 
 def test_without_a_folder_for_the_cache_kernels_are_compiled_in_memory(made, capsys, monkeypatch):

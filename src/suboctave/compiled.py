@@ -6,21 +6,30 @@ same input gives the same bits in every process.
 
 The cache is the folder `__pycache__` beside the sources where that can be written, else Numba's folder in the user's
 directory for caches (`NUMBA_CACHE_DIR` names another); where none can be written every process compiles for itself.
-What has been compiled serves as long as the files of a kernel, and of all that it calls, are what they were.
+What has been compiled serves as long as the files of a kernel, and of all that it calls, are what they were, and as
+long as its own file is whole: a digest tells, and what is damaged is compiled anew. Ctrl-C waits until a compilation is
+over, for it would leave Numba's compiler in a state in which it compiles nothing any more.
 With `NUMBA_DISABLE_JIT=1` kernels are the Python functions that they are written as.
 """
 
 from __future__ import annotations
 
 import gc
+import hashlib
+import itertools
 import pickle
+import signal
 import sys
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 from numba import config, njit
 from numba.core import event
+from numba.core.caching import FunctionCache, IndexDataCacheFile
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -48,6 +57,11 @@ def _print_once(text: str) -> None:
         print(text, file=sys.stderr, flush=True)
 
 
+def notice() -> None:
+    """Print the line that says what this process waits for, once."""
+    _print_once(_WAITING)
+
+
 def without_notice() -> None:
     """Let this process compile without the line that says so: for those who have asked for it."""
     _printed.add(_WAITING)
@@ -70,7 +84,7 @@ class _Compilation(event.Listener):
         self._before.append((config.OPT, config.LOOP_VECTORIZE, gc.isenabled()))
         function = event.data["dispatcher"]
         if function.py_func.__module__.startswith("suboctave"):
-            _print_once(_WAITING)
+            notice()
             gc.disable()
             fast = bool(function.targetoptions.get("fastmath"))
             config.OPT, config.LOOP_VECTORIZE = _THOROUGH if fast else _SWIFT
@@ -85,52 +99,151 @@ class _Compilation(event.Listener):
 event.register("numba:compile", _Compilation())
 
 
-def _files(kernel: Any) -> Any:
-    """Numba's index of what it has compiled of a kernel; None of anything else, or where nothing is kept."""
-    return getattr(getattr(kernel, "_cache", None), "_cache_file", None)
+class _Files(IndexDataCacheFile):
+    """The files of a kernel: an index of what has been compiled by the types of its arguments, and a file for each.
 
-
-def _keep_apart(dispatcher: Any, called: list[Any]) -> None:
-    """Let the cache know a kernel by the files of all kernels that are in it, not by its own alone, and let what other
-    versions have left there, which may name classes that are no more, be as if it were not.
+    Each begins with a digest of the rest. What is damaged, cannot be read, or is of another version or other sources,
+    is as if it were not there. What cannot be written is left.
     """
-    files = _files(dispatcher)
-    if files is None:
-        return
-    stamps = {files._source_stamp}
-    for kernel in called:
-        if _files(kernel) is not None:
-            stamps.update(_files(kernel)._source_stamp)
-    files._source_stamp, load = tuple(sorted(stamps)), files._load_index
 
-    def index() -> Any:
+    #: length of a digest
+    _DIGEST = 16
+
+    def save(self, key: Any, data: Any) -> None:
+        """Keep what has been compiled."""
+        names = self._names()
+        if key not in names:
+            names[key] = next(name for n in itertools.count(1) if (name := self._data_name(n)) not in names.values())
         try:
-            return load()
-        except (AttributeError, ImportError, EOFError, pickle.UnpicklingError):
-            return {}
+            self._write(self._data_path(names[key]), key, data)
+            self._write(self._index_path, None, names)
+        except OSError:
+            _print_once(_NO_CACHE)
 
-    files._load_index = index
+    def load(self, key: Any) -> Any:
+        """What has been compiled, None if there is nothing."""
+        name = self._names().get(key)
+        return None if name is None else self._read(self._data_path(name), key)
+
+    def flush(self) -> None:
+        """Forget what has been compiled."""
+        self._write(self._index_path, None, {})
+
+    def _names(self) -> dict[Any, str]:
+        """The index."""
+        return self._read(self._index_path, None) or {}
+
+    def _write(self, path: str, key: Any, content: Any) -> None:
+        block = self._dump((self._version, self._source_stamp, key, content))
+        try:
+            with self._open_for_write(path) as file:
+                file.write(self._digest(block) + block)
+        except BaseException:
+            for left in Path(path).parent.glob(f"{Path(path).name}.tmp.*"):
+                left.unlink(missing_ok=True)
+            raise
+
+    def _read(self, path: str, key: Any) -> Any:
+        try:
+            whole = Path(path).read_bytes()
+            digest, block = whole[: self._DIGEST], whole[self._DIGEST :]
+            if digest != self._digest(block):
+                return None
+            version, stamp, kept, content = pickle.loads(block)
+        except Exception:  # of whatever kind: unpickling may raise anything
+            return None
+        return content if (version, stamp, kept) == (self._version, self._source_stamp, key) else None
+
+    @classmethod
+    def _digest(cls, block: bytes) -> bytes:
+        return hashlib.blake2b(block, digest_size=cls._DIGEST).digest()
 
 
-def kernel(**options: Any) -> Callable[[_Function], _Function]:
-    """Decorator of a kernel: `numba.njit` with its cache and these options.
+class Cache(FunctionCache):
+    """Numba's cache of a kernel, which is known by the files of all kernels that are in it, not by its own alone."""
+
+    def __init__(self, function: Callable[..., Any], called: list[Any]) -> None:
+        super().__init__(function)
+        stamps = {self._impl.locator.get_source_stamp()}
+        for kernel in called:
+            stamps.update(getattr(getattr(kernel, "_cache", None), "stamps", ()))
+        self.stamps = tuple(sorted(stamps))
+        self._cache_file = _Files(self._cache_path, self._impl.filename_base, self.stamps)
+
+    def holds(self, signature: Any, target: Any) -> bool:
+        """Whether something that was compiled for these types is kept."""
+        return self._cache_file.load(self._index_key(signature, target.codegen())) is not None
+
+    def load_overload(self, signature: Any, target: Any) -> Any:
+        """What has been compiled for these types; None where there is nothing that this process can use."""
+        try:
+            return super().load_overload(signature, target)
+        except Exception:
+            return None
+
+    def save_overload(self, signature: Any, data: Any) -> None:
+        """Keep what has been compiled, where that can be written."""
+        try:
+            super().save_overload(signature, data)
+        except OSError:  # no folder
+            _print_once(_NO_CACHE)
+
+
+@contextmanager
+def _uninterrupted() -> Iterator[None]:
+    """Let Ctrl-C wait until this is over."""
+    before = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(before):
+        yield
+        return
+    arrived: list[tuple[int, Any]] = []
+    signal.signal(signal.SIGINT, lambda number, frame: arrived.append((number, frame)))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+        if arrived:
+            before(*arrived[0])
+
+
+def cached(**options: Any) -> Callable[[_Function], Any]:
+    """Decorator of a function that is compiled when it is first called: `numba.njit` with the cache of this module."""
+
+    def decorate(function: _Function) -> Any:
+        result = njit(**options)(function)
+        if config.DISABLE_JIT:
+            return result
+        called = [function.__globals__.get(name) for name in function.__code__.co_names]
+        try:
+            result._cache = Cache(function, called)
+        except RuntimeError:  # no folder for the cache
+            _print_once(_NO_CACHE)
+        compile_for = result._compile_for_args
+
+        def uninterrupted(*arguments: Any, **named: Any) -> Any:
+            with _uninterrupted():
+                return compile_for(*arguments, **named)
+
+        result._compile_for_args = uninterrupted
+        return result
+
+    return decorate
+
+
+def kernel(**options: Any) -> Callable[[_Function], Any]:
+    """Decorator of a kernel: `cached` with these options.
 
     Sums that the compiler may reorder (`fastmath`) are inlined wherever they are called, with all that is around them.
     Else each caller would have a copy beside the original, compiled in other company and so reordered otherwise, and
     which of them runs would depend on what the process has compiled or loaded before.
     """
 
-    def decorate(function: _Function) -> _Function:
+    def decorate(function: _Function) -> Any:
         if config.DISABLE_JIT:
             return np.errstate(all="ignore")(function)
         called = [function.__globals__.get(name) for name in function.__code__.co_names]
         inlined = "fastmath" in options or any(getattr(k, "targetoptions", {}).get("forceinline") for k in called)
-        try:
-            result = njit(cache=True, forceinline=inlined, **options)(function)
-            _keep_apart(result, called)
-        except RuntimeError:  # no folder for the cache
-            _print_once(_NO_CACHE)
-            result = njit(forceinline=inlined, **options)(function)
+        result = cached(forceinline=inlined, **options)(function)
         KERNELS.append(result)
         return result
 

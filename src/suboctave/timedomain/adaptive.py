@@ -32,7 +32,7 @@ _FIRST_STEP = 0.01
 _LOOSER = 1e-3
 _DRIVER = """
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@cached(nogil=True, error_model="numpy")
 def adaptive(z, at, budget, start, samples, skip, tolerance, address, out, peaks, measure, growth):
     rows = z.reshape(-1, {lanes})
     # not literals, for each of which `control` would be compiled anew

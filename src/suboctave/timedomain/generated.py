@@ -4,7 +4,10 @@ All numbers of W trajectories lie in one array of rows of W numbers. The place o
 of the text, so that the compiler makes vector instructions of the loops over lanes. A module is kept in a file, and
 with it what Numba makes of it: it is named by a digest of its content and of everything that its meaning depends on, so
 that the same text is never compiled twice, and never taken for another. The file is written beside its place and
-renamed: several processes may do so at once; where nothing can be written, a directory of this process serves.
+renamed: several processes may do so at once; where nothing can be written, nothing is kept.
+
+A compiler never gives back the memory in which it has made a text's code, 7 MB of it; what is loaded from its file
+takes 1 MB. So a process that comes by many texts has others compile those beyond the first few.
 
 The directory is `$SUBOCTAVE_CACHE`, else `suboctave` in the user's directory for caches.
 """
@@ -13,25 +16,31 @@ from __future__ import annotations
 
 import functools
 import hashlib
-import importlib.util
 import os
 import sys
 import tempfile
 import threading
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from itertools import accumulate
 from math import prod
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from suboctave.atomic import replace_file
+from suboctave.compiled import Cache, notice, without_notice
+from suboctave.errors import SuboctaveError
 from suboctave.version import __version__
+from suboctave.workers import completed
 
 __all__ = ["Index", "Lanes", "Rows", "module_of"]
 
 #: the index of a row: a number, or the name of the loop's variable that holds it
 Index = int | str
+#: texts that a process compiles itself: that is a second quicker, and takes 7 MB for good
+_COMPILED_HERE = 8
 #: loops over as many rows or fewer are written out
 _MOST_UNROLLED = 4
 
@@ -40,15 +49,15 @@ _HEADER = '''"""Generated: do not edit."""
 from math import pi
 
 import numpy as np
-from numba import njit
 
+from suboctave.compiled import cached
 from suboctave.timedomain.adaptive_control import ERROR_3, ERROR_5, NODES, STAGES, control, follow
 from suboctave.timedomain.lane_functions import arccos, arcsin, arctan, arctan_log, call_back, cos, cosh, exp
 from suboctave.timedomain.lane_functions import log, sin, sine_cosine, sinh, sqrt, tan, tanh
 
 absolute, maximum, sign = abs, max, np.sign
 '''
-_DECORATOR = '@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})'
+_DECORATOR = '@cached(nogil=True, error_model="numpy", fastmath={"contract"})'
 
 
 class Rows:
@@ -153,8 +162,8 @@ class Lanes:
 
 
 @functools.cache
-def _directory() -> Path:
-    """Where generated files are kept; made if it is not there."""
+def _directory() -> Path | None:
+    """Where generated files are kept, made if it is not there; None where nothing can be written."""
     given = os.environ.get("SUBOCTAVE_CACHE")
     try:
         if given:
@@ -167,7 +176,7 @@ def _directory() -> Path:
         with tempfile.TemporaryFile(dir=place):
             pass
     except (OSError, RuntimeError):
-        place = Path(tempfile.mkdtemp(prefix="suboctave-"))
+        return None
     return place
 
 
@@ -181,27 +190,64 @@ def _ground() -> bytes:
 
 
 _lock = threading.Lock()
+#: names of the modules of which this process has compiled functions itself
+_compiled_here: set[str] = set()
 
 
 def module_of(*functions: str) -> ModuleType:
     """The module with these functions; what they are compiled to is loaded by later processes."""
     source = _HEADER + "".join(functions)
     digest = hashlib.sha256(_ground() + b"\0" + source.encode()).hexdigest()[:32]
-    name = f"suboctave_generated_{digest}"
+    return _module(f"suboctave_generated_{digest}", source)
+
+
+def _module(name: str, source: str) -> ModuleType:
     with _lock:
         if name in sys.modules:
             return sys.modules[name]
-        path = _directory() / f"{name}.py"
-        if not path.exists() or path.read_text(encoding="utf-8") != source:
-            replace_file(path, lambda place: place.write_text(source, encoding="utf-8"))
-        spec = importlib.util.spec_from_file_location(name, path)
-        assert spec is not None
-        assert spec.loader is not None
-        module = importlib.util.module_from_spec(spec)
+        module = ModuleType(name)
+        module.__file__ = _kept(name, source)
+        # not imported from its file: Python would keep, and trust, a compiled form beside it
+        exec(compile(source, module.__file__, "exec"), module.__dict__)
+        for function in vars(module).values():
+            if getattr(function, "__module__", "") == name and hasattr(function, "_compile_for_args"):
+                _compiled_elsewhere(function, source)
         sys.modules[name] = module
-        try:
-            spec.loader.exec_module(module)
-        except BaseException:
-            del sys.modules[name]
-            raise
         return module
+
+
+def _compiled_elsewhere(function: Any, source: str) -> None:
+    """Have another process compile a function, and load what it gives, where this one has compiled enough."""
+    compile_here = function._compile_for_args
+
+    def compile_for(*arguments: Any, **named: Any) -> Any:
+        types, cache = tuple(function.typeof_pyval(argument) for argument in arguments), function._cache
+        if isinstance(cache, Cache) and not cache.holds(types, function.targetctx):
+            if len(_compiled_here - {function.__module__}) < _COMPILED_HERE:
+                _compiled_here.add(function.__module__)
+            else:
+                notice()
+                with suppress(SuboctaveError):  # no other process can: this one does
+                    deque(completed(_compile, [(function.__module__, source, function.__name__, types)]), maxlen=0)
+        return compile_here(*arguments, **named)
+
+    function._compile_for_args = compile_for
+
+
+def _compile(task: tuple[str, str, str, Any]) -> None:
+    """What another process does."""
+    name, source, function, types = task
+    without_notice()
+    getattr(_module(name, source), function).compile(types)
+
+
+def _kept(name: str, source: str) -> str:
+    """The file with this text, which Numba keeps what it has compiled with; no file's name where none can be kept."""
+    folder = _directory()
+    if folder is not None:
+        path = folder / f"{name}.py"
+        with suppress(OSError):
+            if not path.exists() or path.read_bytes() != source.encode():
+                replace_file(path, lambda place: place.write_bytes(source.encode()))
+            return str(path)
+    return f"<{name}>"
