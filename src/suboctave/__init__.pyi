@@ -29,6 +29,7 @@ from .curves.events.formulation import (
 )
 from .errors import (
     ConvergenceError as ConvergenceError,
+    FunctionError as FunctionError,
     InputError as InputError,
     NegativeDampingWarning as NegativeDampingWarning,
     SuboctaveError as SuboctaveError,

@@ -89,6 +89,16 @@ class ConvergenceError(SuboctaveError, ArithmeticError):
     """An iteration that did not arrive; the message says where on the curve and what to change."""
 
 
+class FunctionError(InputError):
+    """A function of the user's (of an event, a law, a measure) that failed while something was computed.
+
+    result
+        What had been computed by then, as after Ctrl-C; None for nothing.
+    """
+
+    result: Any = None
+
+
 class TimeLimitError(SuboctaveError):
     """A time limit (`seconds=`) that was reached before there was anything to keep."""
 

@@ -1,9 +1,11 @@
-"""How work is stopped before it is done: by its user, with Ctrl-C, or by a time limit (`seconds=` of the verbs).
+"""How work is stopped before it is done: by its user, with Ctrl-C, by a time limit (`seconds=` of the verbs), or by a
+function of the user's that fails.
 
 Both take one path. The exception of a time limit is a `KeyboardInterrupt`, raised once, by `check_time`, wherever
 Python would raise that of Ctrl-C: long loops and every Newton iteration call it. What catches it keeps what was
 computed and records an `Interruption` in its result. A search that is given an interrupted result passes the
-interruption on (`pass_on`); none of them is kept as complete.
+interruption on (`pass_on`); none of them is kept as complete. A failed function takes the same path within a verb,
+which raises it as a `FunctionError` with the result; elsewhere nothing is kept, and it is a FunctionError at once.
 
 A limit holds for everything that is called while it does; of two limits the nearer one counts. It belongs to its
 thread.
@@ -19,7 +21,7 @@ from dataclasses import dataclass
 from time import monotonic
 from typing import Any, ParamSpec, TypeVar
 
-from suboctave.errors import InputError, TimeLimitError, is_number
+from suboctave.errors import FunctionError, InputError, SuboctaveError, TimeLimitError, is_number
 
 Arguments = ParamSpec("Arguments")
 Given = TypeVar("Given")
@@ -33,22 +35,34 @@ class TimeLimitReached(KeyboardInterrupt):
         self.seconds = seconds
 
 
+class FunctionFailed(KeyboardInterrupt):
+    """A function of the user's failed."""
+
+
 @dataclass(frozen=True)
 class Interruption:
-    """What stopped a computation: a time limit of so many `seconds`, or its user (None)."""
+    """What stopped a computation: a time limit of so many `seconds`, a function that failed (`failure` says how), or
+    its user.
+    """
 
     seconds: float | None = None
+    failure: str = ""
 
     @classmethod
     def of(cls, cause: KeyboardInterrupt) -> Interruption:
         """What an exception tells."""
-        return cls(cause.seconds if isinstance(cause, TimeLimitReached) else None)
+        seconds = cause.seconds if isinstance(cause, TimeLimitReached) else None
+        return cls(seconds, str(cause) if isinstance(cause, FunctionFailed) else "")
 
     def exception(self) -> KeyboardInterrupt:
         """The exception that stops whatever waits for the result."""
+        if self.failure:
+            return FunctionFailed(self.failure)
         return KeyboardInterrupt() if self.seconds is None else TimeLimitReached(self.seconds)
 
     def __str__(self) -> str:
+        if self.failure:
+            return self.failure
         return "interrupted" if self.seconds is None else f"the time limit of {self.seconds:g} s was reached"
 
 
@@ -130,12 +144,71 @@ def unlimited() -> Iterator[None]:
         _DEADLINE.reset(token)
 
 
+#: within a verb that keeps what was computed, how functions have failed so far, and with what exceptions
+_FAILED: ContextVar[list[tuple[str, BaseException | None]] | None] = ContextVar("_FAILED", default=None)
+
+
+@contextmanager
+def users_function(name: str) -> Iterator[None]:
+    """A function of the user's is called within, `name` says which: what it raises is one that failed."""
+    try:
+        yield
+    except SuboctaveError:
+        raise
+    except Exception as failure:
+        words = f"{name} failed with {type(failure).__name__}: {failure}"
+        raise stopping(words, failure) from failure
+
+
+def stopping(words: str, cause: BaseException | None = None) -> BaseException:
+    """The exception that stops because a function failed: what the verb that is under way has computed is kept."""
+    known = _FAILED.get()
+    if known is None:
+        return FunctionError(words)
+    known.append((words, cause))
+    return FunctionFailed(words)
+
+
+@contextmanager
+def at_once() -> Iterator[None]:
+    """What is checked within is wrong input where a function of the user's fails: nothing has been computed."""
+    token = _FAILED.set(None)
+    try:
+        yield
+    finally:
+        _FAILED.reset(token)
+
+
+def keeping(verb: Callable[[], Given]) -> Given:
+    """The result of a verb; a FunctionError that holds it where a function failed. Of verbs that call verbs the
+    outermost one raises it.
+    """
+    if _FAILED.get() is not None:
+        return verb()
+    failed: list[tuple[str, BaseException | None]] = []
+    token = _FAILED.set(failed)
+    result = None
+    try:
+        result = verb()
+    except FunctionFailed as stopped:
+        words = str(stopped)
+    else:
+        words = getattr(getattr(result, "interruption", None), "failure", "")
+        if not words:
+            return result
+    finally:
+        _FAILED.reset(token)
+    error = FunctionError(words)
+    error.result = result
+    raise error from next((cause for how, cause in failed if how in words), None)
+
+
 def limited(verb: Callable[Arguments, Given]) -> Callable[Arguments, Given]:
     """A verb whose keyword `seconds` is a time limit for all that it does."""
 
     @functools.wraps(verb)
     def within(*positional: Arguments.args, **named: Arguments.kwargs) -> Given:
         with time_limit(named.get("seconds")):
-            return verb(*positional, **named)
+            return keeping(functools.partial(verb, *positional, **named))
 
     return within

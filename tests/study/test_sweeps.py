@@ -250,6 +250,27 @@ def test_ctrl_c_leaves_what_is_computed_and_something_to_go_on_with(study, grid,
         so.sweep(study, {"F": [0.1]}, path=path, resume=True)
 
 
+def scaled(factor):
+    """A measure that depends on what it closes over."""
+    return lambda results: {"peak": factor * results["response"].amplitude.max()}
+
+
+def test_what_was_computed_is_taken_over_for_the_same_question_alone(study, tmp_path):
+    """Another measure, grid or time limit gives other numbers, or other failures."""
+    given, path = {"F": [0.1, 0.2]}, tmp_path / "sweep.nc"
+    first = so.sweep(study, given, path=path, measure=scaled(1.0), workers=1)
+    again = so.sweep(study, given, path=path, measure=scaled(1.0), workers=1, resume=True)
+    assert same(first, again)
+    listed = [{"F": 0.1}, {"F": 0.2}]
+    limited = replace(study, seconds=100.0)
+    for question, points, measure in [
+        (study, given, scaled(2.0)), (study, given, None), (study, given, lambda results: {"peak": 1.0}),
+        (study, listed, scaled(1.0)), (limited, given, scaled(1.0)),
+    ]:  # fmt: skip
+        with pytest.raises(so.InputError, match="holds the results of another sweep"):
+            so.sweep(question, points, path=path, measure=measure, workers=1, resume=True)
+
+
 def test_ctrl_c_before_anything_is_ctrl_c(study, tmp_path):
     with pytest.raises(KeyboardInterrupt):
         so.sweep(study, GRID, path=tmp_path / "sweep.nc", progress=stopping_at(0))

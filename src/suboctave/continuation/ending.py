@@ -29,6 +29,7 @@ class EndReason(StrEnum):
     CUT = "cut"  # a part of a longer curve
     INTERRUPTED = "interrupted"
     TIME_LIMIT = "time limit"
+    FUNCTION_FAILED = "function failed"  # a user's
     OTHER = "other"
 
 
@@ -44,6 +45,7 @@ _EARLY = {
     EndReason.NO_MEANING,
     EndReason.INTERRUPTED,
     EndReason.TIME_LIMIT,
+    EndReason.FUNCTION_FAILED,
 }
 
 #: the sentences, from the place, the details and the seconds; where there is none here the details are the sentence
@@ -67,6 +69,7 @@ _SENTENCES = {
     ),
     EndReason.FAILED: "what follows {where} could not be computed: {detail}; what was computed is kept",
     EndReason.INTERRUPTED: "interrupted at {where}; what was computed is kept",
+    EndReason.FUNCTION_FAILED: "beyond {where}: {detail}; what was computed is kept",
     EndReason.TIME_LIMIT: "the time limit of {seconds:g} s was reached at {where}; what was computed is kept",
 }
 
@@ -86,6 +89,8 @@ class Ending:
     @classmethod
     def stopped(cls, interruption: Interruption, where: str) -> Ending:
         """Where an interruption found a curve."""
+        if interruption.failure:
+            return cls(EndReason.FUNCTION_FAILED, where, interruption.failure)
         reason = EndReason.INTERRUPTED if interruption.seconds is None else EndReason.TIME_LIMIT
         return cls(reason, where, seconds=interruption.seconds)
 
@@ -99,6 +104,8 @@ class Ending:
         """What stopped the curve before its end; None where it came to one."""
         if self.reason in (EndReason.INTERRUPTED, EndReason.TIME_LIMIT):
             return Interruption(self.seconds)
+        if self.reason is EndReason.FUNCTION_FAILED:
+            return Interruption(failure=f"beyond {self.where}: {self.detail}")
         return None
 
     def __str__(self) -> str:

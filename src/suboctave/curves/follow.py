@@ -41,9 +41,9 @@ from suboctave.curves.motion import CRITICAL, MotionEvaluation, MotionProblem
 from suboctave.curves.refine import bifurcation_at, solved_bifurcation, solved_in, turns_at
 from suboctave.curves.sample import Sample
 from suboctave.curves.trace import Settings, Trace, joined
-from suboctave.errors import ConvergenceError, InputError
+from suboctave.errors import ConvergenceError
 from suboctave.harmonic.truncation import next_harmonics
-from suboctave.interruption import Interruption
+from suboctave.interruption import Interruption, stopping, users_function
 
 #: growth of motions of every size at one value of the parameter after which they may grow for ever: of a piece that a
 #: branch begins with, and of others
@@ -510,15 +510,13 @@ class _Follower(Driver):
         return known[3]
 
     def _event_value(self, event: Event, sample: Sample) -> float:
-        try:
+        with users_function(f"the function of the event {event.name!r}"):
             value = event.function(sample.orbit)
-        except Exception as failure:
-            failure.add_note(f"raised by the function of the event {event.name!r} at {sample.where}")
-            raise
         with suppress(TypeError, ValueError, OverflowError):
             if np.isfinite(number := float(value)):
                 return number
-        raise InputError(f"event {event.name!r} returned {value!r} at {sample.where}; it must return a finite number")
+        what = f"the function of the event {event.name!r} returned {value!r} at {sample.where}"
+        raise stopping(f"{what}; it must return a finite number")
 
     def _event(self, event: Event, a: Sample, b: Sample) -> Bifurcation | None:
         value_a, value_b = (self._event_value(event, sample) for sample in (a, b))

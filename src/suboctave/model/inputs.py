@@ -13,7 +13,7 @@ from typing import Any, ParamSpec, Protocol, TypeVar
 import numpy as np
 
 from suboctave.errors import ConvergenceError, InputError, chosen_dof, is_number, shortened, suggest
-from suboctave.interruption import time_limit
+from suboctave.interruption import keeping, time_limit
 from suboctave.model.elements.base import Array, numbers_of
 from suboctave.model.system import System
 
@@ -193,7 +193,7 @@ def timed(verb: Callable[Arguments, Curve]) -> Callable[Arguments, Curve]:
         begin = perf_counter()
         try:
             with time_limit(named.get("seconds")):
-                result = verb(*positional, **named)
+                result = keeping(functools.partial(verb, *positional, **named))
         except (ZeroDivisionError, OverflowError, ConvergenceError) as failure:
             extreme = extreme_number(*positional, *named.values())
             if extreme is None or hasattr(failure, "__notes__"):  # a mistake of ours, or of a user's function

@@ -189,12 +189,12 @@ def _run(
         head()
         if watching is not None:
             watching.note(item)
+        if item.failure:
+            screen.print(f"\n{item.step.name}", style="bold", end="")
+            screen.print(f": failed. {item.failure}")
         if item.result is not None:
             note = ", taken from the earlier run" if item.reused else f" in {item.seconds:.2f} s"
             print_result(screen, item.step.name, item.result, note)
-        else:
-            screen.print(f"\n{item.step.name}", style="bold", end="")
-            screen.print(f": failed. {item.failure}")
 
     outcome = run_study(read, out, overwrite, resume, watch, report, seconds)
     if watching is not None:

@@ -20,6 +20,7 @@ from suboctave.harmonic.condensed import condense
 from suboctave.harmonic.linear_part import LinearPart
 from suboctave.model.system import System, describe
 from suboctave.study.figures import FIGURES, Figure, StudyCurves
+from suboctave.study.fingerprint import code_in
 from suboctave.study.mistakes import Lines, Mistake, Mistakes, Section, StudyError
 from suboctave.study.outputs import Outputs, check_outputs
 from suboctave.study.steps import STEPS, CheckContext, Known, Step
@@ -77,7 +78,8 @@ class Study:
 
     @cached_property
     def keys(self) -> dict[str, str]:
-        """Of each analysis what it depends on, as a digest: version, system, arguments, the analyses it starts from.
+        """Of each analysis what it depends on, as a digest: version, system, arguments, Python code that these name,
+        the analyses it starts from.
 
         Not its time limit: what is finished did not need more.
         """
@@ -90,6 +92,8 @@ class Study:
                 "step": {k: v for k, v in step.model_dump(mode="json").items() if k not in ("name", "seconds")},
                 "needs": [keys[name] for _, name in step.needs()],
             }
+            if code := code_in((content["system"], content["step"])):
+                content["code"] = code
             keys[step.name] = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
         return keys
 

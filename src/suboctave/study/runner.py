@@ -11,6 +11,7 @@ those of their curves and closed branches, "part"; before that of a table those 
 
 from __future__ import annotations
 
+import traceback
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, closing, nullcontext
 from dataclasses import dataclass, field
@@ -19,7 +20,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from suboctave.analysis.diagram import Keeper
-from suboctave.errors import ConvergenceError, InputError, TimeLimitError
+from suboctave.errors import ConvergenceError, FunctionError, InputError, TimeLimitError
 from suboctave.experiments.common import TimeResult
 from suboctave.interruption import Interruption, check_seconds, time_limit
 from suboctave.maps.isolas.result import Isolas
@@ -140,7 +141,7 @@ def run_study(
             for step in study.steps:
                 whole = unfinished.isdisjoint(name for _, name in step.needs())
                 done = _one(study, step, results, journal, watch, whole)
-                if done.interruption is not None or not whole:
+                if done.interruption is not None or done.failure or not whole:
                     unfinished.add(step.name)
                 if done.result is not None:
                     results[step.name] = done.result
@@ -239,7 +240,7 @@ def _one(
     with nullcontext() if watch is None else watch(step) as progress:
         noted.progress = progress
         done = analysed(study, step, results, noted, noted if whole else None)
-    if done.result is not None and done.interruption is None and whole:
+    if done.result is not None and done.interruption is None and not done.failure and whole:
         noted.finish(done.result, done.seconds)
     return done
 
@@ -263,11 +264,19 @@ def analysed(
         interruption = Interruption.of(cause)
     except TimeLimitError as error:
         failure, interruption = str(error), Interruption(step.seconds)
+    except FunctionError as error:
+        failure = str(error)
+        # what else has a part only is no result that later analyses could start from
+        outcome = error.result if isinstance(error.result, Branch) else None
     except (ConvergenceError, InputError) as error:
         failure, wrong = str(error), isinstance(error, InputError)
     except ArithmeticError as error:  # a size of 1e200 whose square is no number
         failure = f"the numbers grew too large or too small ({error}): choose units in which they are nearer to 1"
-    if outcome is not None:
+    except Exception as error:
+        last = traceback.extract_tb(error.__traceback__)[-1]
+        place = f"{Path(last.filename).name}, line {last.lineno}"
+        failure = f"an error that nobody has foreseen, please report it: {type(error).__name__}: {error} ({place})"
+    if outcome is not None and not failure:
         interruption = interruption or outcome.interruption
     return Finished(step, outcome, perf_counter() - begin, False, failure, wrong, interruption)
 

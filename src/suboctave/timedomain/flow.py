@@ -19,8 +19,8 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from suboctave.errors import ConvergenceError, InputError, check_numbers, shortened, suggest
-from suboctave.interruption import Interruption, check_time, pass_on
+from suboctave.errors import ConvergenceError, FunctionError, InputError, check_numbers, shortened, suggest
+from suboctave.interruption import Interruption, check_time, pass_on, stopping
 from suboctave.model.elements.base import Array
 from suboctave.model.inputs import check_count
 from suboctave.model.system import System
@@ -279,22 +279,30 @@ class _Run:
         self.groups = [range(first, min(first + lanes, count)) for first in range(0, count, lanes)]
         self.done = [0.0] * len(self.groups)
         self.stop = threading.Event()
+        callbacks.halted = self.stop.is_set
 
     def go(self, workers: int | None, report: Report | None) -> Motions:
         """Follow all of them."""
         many = min(processors() if workers is None else check_count("workers", workers), len(self.groups))
         interruption: Interruption | None = None
         try:
-            if many <= 1:
+            # in a thread of its own what calls back can be left in the middle: in this one Ctrl-C would be lost in C
+            if many <= 1 and not self.callbacks.address:
                 for g in range(len(self.groups)):
                     self._follow(g, report)
             else:
-                self._together(many, report)
+                self._together(max(1, many), report)
         except KeyboardInterrupt as cause:
             self.stop.set()
             interruption = Interruption.of(cause)
-        if self.callbacks.failure is not None:
-            raise self.callbacks.failure
+        if (failure := self.callbacks.failure) is not None:
+            if not isinstance(failure, FunctionError):
+                raise failure
+            # the thread that it failed in keeps nothing
+            stopped = stopping(str(failure), failure.__cause__)
+            if not isinstance(stopped, KeyboardInterrupt):
+                raise failure
+            interruption = interruption or Interruption.of(stopped)
         motions = self.motions
         motions.failed[motions.finished & ~np.isfinite(motions.end).all(axis=1)] = True
         return replace(motions, interruption=interruption)
@@ -336,7 +344,7 @@ class _Run:
             effort = max(1, int(effort * min(4.0, _INTERVAL / max(perf_counter() - started, 1e-6))))
             self.done[g] = 1.0 - min(1.0, method.left(group) / (batch.total * len(members)))
             self._report(report)
-        if not arrived or self.stop.is_set():
+        if not arrived or self.stop.is_set() or self.callbacks.failure is not None:
             return
         samples = {name: getattr(group, name).transpose(2, 0, 1) for name in ("states", "peaks", "growth")}
         for name, values in (samples | method.results(group)).items():

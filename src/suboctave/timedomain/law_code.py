@@ -117,11 +117,14 @@ class PythonCallbacks:
 
     It is given the number of the law, of trajectories W, and the address of a block of rows of W numbers: the states
     that the law reads, the phase, its numbers, then room for the force and its derivatives. What a law raises is kept
-    in `failure`: no exception passes through code of C.
+    in `failure`: no exception passes through code of C. Once that, or `halted`, says so, forces are no numbers and no
+    law is called any more, so that what waits for them comes to its end.
     """
 
     def __init__(self, laws: Sequence[PlacedLaw]) -> None:
         self.failure: BaseException | None = None
+        #: whether nobody waits for the forces any longer
+        self.halted: Callable[[], bool] = bool
         self._laws = [(as_coupled(placed.element), placed.states, placed.form) for placed in laws]
         self._function = CALLBACK(self._call)
         self.address = ctypes.cast(self._function, ctypes.c_void_p).value or 0 if laws else 0
@@ -132,6 +135,9 @@ class PythonCallbacks:
             size = 2 * states + form.count + 2
             block = np.ctypeslib.as_array(ctypes.cast(address, ctypes.POINTER(ctypes.c_double)), (size, lanes))
             begin = states + 1 + form.count
+            if self.failure is not None or self.halted():
+                block[begin:] = np.nan
+                return
             numbers = block[states + 1 + form.corners : begin]
             _evaluate(law, block[:states].copy(), block[states].copy(), numbers.copy(), block[begin:])
         except BaseException as failure:  # nothing may pass through C

@@ -10,6 +10,8 @@ displacements, or on time, are in `coupled`. Derivatives that are not given are 
 
 from __future__ import annotations
 
+import functools
+import inspect
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from numbers import Integral
@@ -19,6 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from suboctave.errors import InputError, located, shortened
+from suboctave.interruption import users_function
 from suboctave.model.description import Recorded
 from suboctave.model.elements.batch_form import BatchForm, CalledBack, form_of_sampling
 from suboctave.model.elements.smoothness import Sampling, WholeLaw, widths_of
@@ -90,6 +93,25 @@ class Place:
         return f"dof={self.dofs[0]}" if len(self.dofs) == 1 else f"dof={self.dofs}"
 
 
+#: methods of an element that give its law
+_LAWS = frozenset(
+    ("tangent", "curvature", "third", "coefficient_tangent", "coefficient_curvature", "sampling", "law_at", "surface")
+)
+
+
+def _of_user(name: str, method: Any) -> Any:
+    """A method of a user's own element: what it raises is a function of the user's that failed."""
+    if not inspect.isfunction(method) or getattr(method, "__isabstractmethod__", False):
+        return method
+
+    @functools.wraps(method)
+    def called(self: Any, *positional: Any, **named: Any) -> Any:
+        with users_function(f"{self.label}: {name}"):
+            return method(self, *positional, **named)
+
+    return called
+
+
 class BaseElement(Recorded, ABC, family="element"):
     """What all elements have in common: where they act, and their coefficients. Immutable by convention.
 
@@ -124,6 +146,12 @@ class BaseElement(Recorded, ABC, family="element"):
         self.coefficients: tuple[Coefficient, ...] = read
         self._constant = np.array([c.value({}) if c.constant else np.nan for c in read])
         self._varying = tuple((i, c) for i, c in enumerate(read) if not c.constant)
+
+    def __init_subclass__(cls, **more: Any) -> None:
+        super().__init_subclass__(**more)
+        if not cls.__module__.startswith("suboctave."):
+            for name in _LAWS.intersection(vars(cls)):
+                setattr(cls, name, _of_user(name, vars(cls)[name]))
 
     @property
     def label(self) -> str:

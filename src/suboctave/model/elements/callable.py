@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from suboctave.errors import InputError, shortened
+from suboctave.interruption import at_once, stopping, users_function
 from suboctave.model.elements.base import Array, Dof, Element, central_difference, required, shift_derivative, step_of
 from suboctave.model.elements.smoothness import AdaptiveSampling
 from suboctave.model.expressions.coefficients import Number
@@ -75,8 +76,11 @@ class Callable(Element):
 
     def check(self, values: Mapping[str, float], first: bool) -> None:
         """Refuse a function that fails, or does not return finite numbers, or derivatives that are not its own."""
-        if not first:
-            return
+        if first:
+            with at_once():
+                self._check(values)
+
+    def _check(self, values: Mapping[str, float]) -> None:
         u, v = _DRAWS
         c = self.coefficient_values(values)
         f = self._value(u, v, c)
@@ -131,18 +135,15 @@ class Callable(Element):
         return [np.asarray(self.function(*place, *c)) for place in places]
 
     def _value(self, u: Array, v: Array, c: Array) -> Array:
-        try:
+        with users_function(f"{self.label}: the function"):
             f = np.asarray(self.function(u, v, *c))
             if f.dtype.kind not in "biufc":
                 raise TypeError(f"it returned {shortened(f.tolist())}, no numbers")
-        except Exception as error:
-            raise InputError(f"{self.label}: the function failed with {type(error).__name__}: {error}") from error
         if np.iscomplexobj(f) or f.shape != u.shape:
             if f.shape == () and not np.iscomplexobj(f):
                 return np.full(u.shape, float(f))
-            raise InputError(
-                f"{self.label}: the function must return real arrays of shape {u.shape}, not {f.dtype} {f.shape}"
-            )
+            what = f"{self.label}: the function must return real arrays of shape {u.shape}, not {f.dtype} {f.shape}"
+            raise stopping(what)
         return f.astype(float)
 
     def _given(self, u: Array, v: Array, c: Array) -> tuple[Array, Array]:
@@ -151,17 +152,16 @@ class Callable(Element):
             f_u, f_v = self.derivatives(u, v, *c)
             return np.broadcast_to(np.asarray(f_u, float), u.shape), np.broadcast_to(np.asarray(f_v, float), u.shape)
         except Exception as error:
-            raise InputError(
-                f"{self.label}: derivatives= must return (f_x, f_v), two real arrays of shape {u.shape}; "
-                f"{type(error).__name__}: {error}"
-            ) from error
+            what = f"{self.label}: derivatives= must return (f_x, f_v), two real arrays of shape {u.shape}"
+            raise stopping(f"{what}; {type(error).__name__}: {error}", error) from error
 
     def _slopes(self, u: Array, v: Array, c: Array) -> tuple[Array, Array]:
         """`(f_u, f_v)`."""
         if self.derivatives is not None:
             return self._given(u, v, c)
         if self._complex:
-            by_u, by_v = (np.imag(f) / _COMPLEX * np.ones_like(u) for f in self._stepped(u, v, c))
+            with users_function(f"{self.label}: the function (of complex numbers)"):
+                by_u, by_v = (np.imag(f) / _COMPLEX * np.ones_like(u) for f in self._stepped(u, v, c))
             return by_u, by_v
         return self._differences(u, v, c)
 

@@ -23,6 +23,7 @@ from suboctave.options import RunOptions, with_options
 from suboctave.progress import Report, reporting
 from suboctave.store.journal import Journal
 from suboctave.study.file import Study, read_study
+from suboctave.study.fingerprint import fingerprint
 from suboctave.study.results import load
 from suboctave.study.sweeps.gather import gathered
 from suboctave.study.sweeps.plan import Plan, SweepSection, plan_of
@@ -137,11 +138,16 @@ def _asked(study: Study, parameters: Any, options: SweepOptions) -> tuple[Plan, 
 
 
 def _key(study: Study, plan: Plan, listed: int, measure: Measure | None) -> str:
-    """What the numbers depend on, as a digest."""
-    content = [__version__, list(study.keys.items()), plan.names, listed, getattr(measure, "__qualname__", "")]
-    digest = hashlib.sha256(json.dumps(content).encode())
-    digest.update(plan.points.tobytes())
-    return digest.hexdigest()
+    """What the numbers depend on, as a digest: a time limit too, for it makes points fail."""
+    content = {
+        "version": __version__,
+        "analyses": list(study.keys.items()),
+        "seconds": [study.seconds, *(step.seconds for step in study.steps)],
+        "points": [plan.names, plan.origin, hashlib.sha256(plan.points.tobytes()).hexdigest()],
+        "listed": listed,
+        "measure": None if measure is None else fingerprint(measure),
+    }
+    return hashlib.sha256(json.dumps(content).encode()).hexdigest()
 
 
 # -------------------------------------------------------------------------------------------------------- what is kept
