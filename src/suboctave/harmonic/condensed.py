@@ -45,6 +45,7 @@ from suboctave.harmonic.reduction import Reduction
 from suboctave.lazy import lazy
 from suboctave.model.inputs import check_count, check_is_system, observed_dof
 from suboctave.model.matrices import viscous_damping
+from suboctave.model.modes import Modes, modes_of
 from suboctave.model.projected import projected_words
 from suboctave.model.system import System
 
@@ -329,7 +330,17 @@ class Condensed:
     @lazy
     def _equation(self) -> tuple[Array, Array, Array]:
         mass, damping, stiffness, structural = self._matrices
-        return mass, damping + viscous_damping(mass, stiffness, structural), stiffness
+        if structural.any():
+            damping = damping + viscous_damping(mass, structural, self._undamped)
+        return mass, damping, stiffness
+
+    def modes(self) -> Modes:
+        """See `LinearPart.modes`."""
+        return self._undamped
+
+    @lazy
+    def _undamped(self) -> Modes:
+        return modes_of(self._matrices[0], self._matrices[2], self.projected.terms)
 
     def read(self, motion: Array) -> Array:
         """See `LinearPart.read`."""

@@ -19,13 +19,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
-import scipy.linalg
 from numpy.typing import NDArray
 
 from suboctave.compiled import kernel
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.lazy import lazy
 from suboctave.model.matrices import MatrixCoefficient, viscous_damping
+from suboctave.model.modes import Modes, modes_of
 from suboctave.model.system import System
 from suboctave.units import UnitSystem
 
@@ -76,6 +76,9 @@ class LinearPart(Protocol):
 
         There is none of structural damping: its viscous equivalent stands for it (`System.viscous_equivalent`).
         """
+
+    def modes(self) -> Modes:
+        """Its undamped modes, in the DOFs of the equation of motion."""
 
     def read(self, motion: Array) -> Array:
         """The unknowns (..., size) of a motion of the structure, (..., n); of a direction, what they do along it."""
@@ -162,7 +165,17 @@ class StructuralMatrices:
     @lazy
     def _equation(self) -> tuple[Array, Array, Array]:
         mass, damping, stiffness, structural = self.matrices
-        return mass, damping + viscous_damping(mass, stiffness, structural), stiffness
+        if structural.any():
+            damping = damping + viscous_damping(mass, structural, self._undamped)
+        return mass, damping, stiffness
+
+    def modes(self) -> Modes:
+        """See `LinearPart.modes`."""
+        return self._undamped
+
+    @lazy
+    def _undamped(self) -> Modes:
+        return modes_of(self.matrices[0], self.matrices[2])
 
     def expand(self, direction: Array) -> Array:
         """The unknowns are the DOFs of the equation of motion."""
@@ -216,10 +229,8 @@ def feeding_matrices(matrices: Array) -> Array:
 
 def natural_frequencies(linear: LinearPart) -> Array:
     """Circular natural frequencies of its equation of motion, undamped, ascending, (N,); 0 for what is free to move."""
-    mass, _, stiffness = linear.equation_of_motion()
-    values = scipy.linalg.eigh(0.5 * (stiffness + stiffness.T), 0.5 * (mass + mass.T), eigvals_only=True)
-    free = np.abs(values) <= 1e-10 * np.abs(np.median(values))
-    return np.sqrt(np.where(free, 0.0, np.maximum(values, 0.0)))
+    modes = linear.modes()
+    return np.sqrt(np.where(modes.rigid, 0.0, np.maximum(modes.squares, 0.0)))
 
 
 def damping_words(system: System) -> tuple[str, ...]:

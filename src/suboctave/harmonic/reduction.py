@@ -35,6 +35,7 @@ from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.interruption import check_time
 from suboctave.lazy import lazy
 from suboctave.model.matrices import MatrixCoefficient, sparse_factors
+from suboctave.model.modes import terms_of
 from suboctave.model.system import System
 from suboctave.model.updated import Updated
 
@@ -70,6 +71,8 @@ class Projected(NamedTuple):
         The basis V, (n, r); None for the structure's own degrees of freedom.
     seen
         The directions in it, D V, (m, r).
+    terms
+        `v^T |K| v` of its vectors, (r,), see `modes_of`; None for the structure's own degrees of freedom.
     covers
         Highest frequency it is made for.
     """
@@ -77,6 +80,7 @@ class Projected(NamedTuple):
     matrices: tuple[MatrixCoefficient, ...]
     shapes: Array | None
     seen: Array
+    terms: Array | None
     covers: float
 
 
@@ -206,12 +210,14 @@ class Reduction:
     def projected(self) -> Projected:
         """The structure in the basis, turned to its modes at the values that it was grown at."""
         if self.system.n <= COMPLETE:
-            return Projected(self._matrices, None, self.directions, math.inf)
+            return Projected(self._matrices, None, self.directions, None, math.inf)
         mass, _, stiffness, _ = self._small
         _, modes = eigh(0.5 * (stiffness + stiffness.T), 0.5 * (mass + mass.T))
         shapes = self._shapes @ modes
         matrices = tuple(matrix.projected(shapes) for matrix in self._matrices)
-        return Projected(matrices, shapes, self.directions @ shapes, max(one.covers for one in self._tested))
+        terms = terms_of(shapes, self._matrices[2].sparse_value(self._tested[-1].values))
+        covers = max(one.covers for one in self._tested)
+        return Projected(matrices, shapes, self.directions @ shapes, terms, covers)
 
     @lazy
     def error(self) -> float:

@@ -17,6 +17,7 @@ from suboctave.errors import InputError, NegativeDampingWarning, located
 from suboctave.lazy import lazy
 from suboctave.model.elements.base import Array
 from suboctave.model.expressions.coefficients import Coefficient, coefficient
+from suboctave.model.modes import Modes
 from suboctave.model.updated import Updated, largest_entry
 
 #: largest asymmetry of a mass, in units of sqrt(M_ii M_jj)
@@ -27,8 +28,6 @@ _DENSE = 600
 _MOST_DENSE = 12000
 #: share of the largest eigenvalue of a damping below which a negative one is rounding
 _ROUNDING = 1e-9
-#: square of a natural frequency relative to the median below which a mode moves freely
-_FREE = 1e-10
 
 
 class MatrixCoefficient:
@@ -247,22 +246,17 @@ def _added(like: Any, terms: Sequence[tuple[Coefficient, Any]], what: str) -> Ma
     return MatrixCoefficient(base, [(c, matrix) for c, matrix in terms if not c.constant], what)
 
 
-def viscous_damping(mass: Array, stiffness: Array, structural: Array) -> Array:
+def viscous_damping(mass: Array, structural: Array, modes: Modes) -> Array:
     """The viscous damping that stands in for a structural one S, all (n, n):
 
         C = M Phi diag(w)^-1/2 (Phi^T S Phi) diag(w)^-1/2 Phi^T M,        K Phi = M Phi diag(w^2),  Phi^T M Phi = 1.
 
     It takes from every mode at its own frequency w what S takes, and nothing from rigid-body modes.
     """
-    from scipy.linalg import eigh
-
-    if not structural.any():
-        return np.zeros_like(structural)
-    values, modes = eigh(0.5 * (stiffness + stiffness.T), 0.5 * (mass + mass.T))
-    moving = values > _FREE * np.median(np.abs(values))
-    weight = np.where(moving, np.where(moving, values, 1.0) ** -0.25, 0.0)
-    momenta = mass @ modes
-    inside = weight[:, None] * (modes.T @ structural @ modes) * weight
+    vibrating = ~modes.rigid & (modes.squares > 0.0)
+    weight = np.where(vibrating, np.where(vibrating, modes.squares, 1.0) ** -0.25, 0.0)
+    momenta = mass @ modes.shapes
+    inside = weight[:, None] * (modes.shapes.T @ structural @ modes.shapes) * weight
     result: Array = momenta @ inside @ momenta.T
     return result
 

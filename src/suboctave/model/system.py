@@ -23,6 +23,7 @@ from suboctave.model.expressions.coefficients import Coefficient
 from suboctave.model.expressions.reader import RESERVED
 from suboctave.model.loads import HarmonicLoad, Load, LoadComponent
 from suboctave.model.matrices import MatrixCoefficient, check_damping, check_mass, matrix_coefficient, viscous_damping
+from suboctave.model.modes import modes_of
 from suboctave.units import UnitSystem
 
 _MATRICES = ("mass", "damping", "stiffness", "structural")
@@ -262,7 +263,7 @@ class System:
         if self.structural.zero:
             return self
         mass, _, stiffness = self.matrices()
-        more = viscous_damping(mass, stiffness, self.structural.value(self.parameters))
+        more = viscous_damping(mass, self.structural.value(self.parameters), modes_of(mass, stiffness))
         return self._changed(damping=self.damping.plus(more), structural=self.mass.zeros("structural"))._pruned()
 
     def without_excitation(self) -> System:

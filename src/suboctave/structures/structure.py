@@ -152,9 +152,10 @@ class Structure:
         """The lowest `count` natural frequencies without damping, with their modes; rigid-body modes are counted.
 
         Printed, they are a table in radians per unit time and in hertz: frequencies 10^1.5 or 10^3 off show units that
-        do not fit each other.
+        do not fit each other. Degrees of freedom without mass follow the others; those that have no stiffness either
+        are left out, and the table says which.
         """
-        return natural_frequencies(self.mass, self.stiffness, count)
+        return natural_frequencies(self.mass, self.stiffness, count, self.dofs)
 
     def system(
         self,
