@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+from contextlib import suppress
 from pathlib import Path
 
 import h5py
@@ -12,6 +13,7 @@ import scipy.io
 import scipy.sparse
 
 import suboctave as so
+from suboctave.structures.files import read_matrix
 
 
 def same(structure: so.Structure, chain, damping: bool = False, labels: bool = False, rtol: float = 0.0) -> None:
@@ -170,6 +172,84 @@ def test_what_was_saved_is_read_again(tmp_path, structure, chain):
             assert read.damping == damping
     with pytest.raises(so.InputError, match=r"saved in an \.npz file"):
         structure.save(tmp_path / "s.h5")
+
+
+# -------------------------------------------------------------------------------------------- Matrix Market, any ending
+def test_matrix_market_is_known_by_how_it_begins(tmp_path, chain):
+    """Under any ending, packed or not, in small letters or great ones, with a mark of its code or without."""
+    for suffix in (".mm", ".txt", ".dat", "", ".K", ".npz"):
+        files = {what: tmp_path / f"{what}{suffix}" for what in ("mass", "stiffness")}
+        for what, path in files.items():
+            scipy.io.mmwrite(tmp_path / "a.mtx", scipy.sparse.coo_array(getattr(chain, what)), precision=17)
+            path.write_bytes((tmp_path / "a.mtx").read_bytes())
+        same(so.read_structure(**files), chain)
+    data = files["mass"].read_bytes()
+    (tmp_path / "mass.mm.gz").write_bytes(gzip.compress(data))
+    files["mass"].write_bytes(b"\xef\xbb\xbf" + data.replace(b"%%MatrixMarket matrix", b"%%matrixmarket MATRIX"))
+    same(so.read_structure(mass=tmp_path / "mass.mm.gz", stiffness=files["stiffness"]), chain)
+    same(so.read_structure(**files), chain)
+
+
+@pytest.mark.parametrize("layout", ["coordinate", "array"])
+@pytest.mark.parametrize("symmetry", ["general", "symmetric", "skew-symmetric", "hermitian"])
+@pytest.mark.parametrize("field", ["real", "integer", "complex"])
+def test_matrix_market_as_scipy_writes_it(layout, symmetry, field, tmp_path):
+    rng = np.random.default_rng(2)
+    matrix = rng.integers(-9, 9, (5, 5)) * (1 if field == "integer" else 1 / 7)
+    matrix = matrix * (1 + 0.3j) if field == "complex" else matrix
+    turn = {"general": 0.0 * matrix, "symmetric": matrix.T, "skew-symmetric": -matrix.T, "hermitian": matrix.conj().T}
+    matrix = matrix + turn[symmetry]
+    given = scipy.sparse.coo_array(matrix) if layout == "coordinate" else matrix
+    scipy.io.mmwrite(tmp_path / "a.mtx", given, field=field, symmetry=symmetry, precision=17)
+    assert f"{layout} {field} {symmetry}" in (tmp_path / "a.mtx").read_text()
+    read = read_matrix(tmp_path / "a.mtx")
+    np.testing.assert_allclose(read.toarray() if layout == "coordinate" else read, matrix, rtol=1e-16)
+
+
+def test_numbers_of_matrix_market_are_read_to_their_end(tmp_path):
+    """Exponents of Fortran, which SciPy leaves out; what is no number is said, with no end of the process."""
+    header = "%%MatrixMarket matrix coordinate real general\n% remark: Träger\n\n2 2 2\n1 1 3.0\n"
+    for last, value in (("2 2 1.5D+3", 1500.0), ("2 2 1.5d-3", 0.0015), ("  2\t2   7", 7.0)):
+        (tmp_path / "a.mtx").write_bytes((header + last + "\n").encode("latin-1"))
+        np.testing.assert_array_equal(read_matrix(tmp_path / "a.mtx").toarray(), np.diag([3.0, value]))
+    for last in (
+        "2 2 1.0\0",
+        "2 2\0 1.0",
+        "2\0 2 1.0",
+        "2 2 1.0x",
+        "2 2 1.0.5",
+        "2 2 1.0 7",
+        "2 2 1.0e",
+        "2 2 -",
+        "2 1.5 3",
+    ):
+        (tmp_path / "a.mtx").write_text(header + last + "\n")
+        with pytest.raises(so.InputError, match=r"a\.mtx"):
+            read_matrix(tmp_path / "a.mtx")
+    (tmp_path / "a.mtx").write_text("%%MatrixMarket matrix coordinate real symmetric\n2 2 2\n1 2 3.0\n2 1 3.0\n")
+    with pytest.raises(so.InputError, match="symmetric, but has entries on both sides"):
+        read_matrix(tmp_path / "a.mtx")
+
+
+def test_damaged_bytes_are_one_line(tmp_path, chain):
+    """Each byte of a small file replaced by others: it is a matrix, or an InputError."""
+    scipy.io.mmwrite(tmp_path / "a.mtx", scipy.sparse.coo_array(chain.mass[:2, :2]), precision=3)
+    data = (tmp_path / "a.mtx").read_bytes()
+    for place in range(len(data)):
+        for byte in b"\x00\xff-%9 \n":
+            (tmp_path / "b.mtx").write_bytes(data[:place] + bytes([byte]) + data[place + 1 :])
+            with suppress(so.InputError):
+                read_matrix(tmp_path / "b.mtx")
+
+
+def test_what_is_damaged_beside_them_is_in_nobodys_way(tmp_path, chain):
+    """A group, or parts of an archive, that look like a sparse matrix and are none."""
+    with h5py.File(write_h5_dense(tmp_path, chain), "a") as file:
+        for part in ("data", "indices", "indptr"):
+            file[f"results/{part}"] = np.arange(3.0)
+    same(so.read_structure(tmp_path / "s.h5"), chain, damping=True)
+    np.savez(tmp_path / "s.npz", M=chain.mass, K=chain.stiffness, mesh_indptr=np.arange(3))
+    same(so.read_structure(tmp_path / "s.npz"), chain)
 
 
 # ------------------------------------------------------------------------------------------------ one file for a matrix

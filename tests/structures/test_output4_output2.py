@@ -60,19 +60,24 @@ def text_output4(matrices, form, count, digits, letter="E"):
     width = digits + 7
     lines = []
     for name, matrix in matrices.items():
-        n = len(matrix)
-        lines.append(f"{n:8d}{-n if form == 'big' else n:8d}{6:8d}{2:8d}{name:<8}1P,{count}E{width}.{digits}")
+        rows, n = matrix.shape
+        kind, parts_of = (4, 2) if np.iscomplexobj(matrix) else (2, 1)
+        head = f"{n:8d}{-rows if form == 'big' else rows:8d}{6 if rows == n else 2:8d}{kind:8d}{name:<8}"
+        lines.append(f"{head}1P,{count}E{width}.{digits}")
         for j in range(n):
             parts = list(runs(matrix[:, j]))
             if form == "dense" and parts:
                 first, last = parts[0][0], parts[-1][0] + len(parts[-1][1]) - 1
                 parts = [(first, matrix[first - 1 : last, j])]
             if parts:
-                words = sum(2 * len(entries) + {"dense": 0, "sparse": 1, "big": 2}[form] for _, entries in parts)
+                size = 2 * parts_of
+                words = sum(size * len(entries) + {"dense": 0, "sparse": 1, "big": 2}[form] for _, entries in parts)
                 row = parts[0][0] if form == "dense" else 0
                 lines.append(f"{j + 1:8d}{row:8d}{words:8d}")
             for first, entries in parts:
-                length = 2 * len(entries) + 1
+                length = size * len(entries) + 1
+                if parts_of == 2:
+                    entries = np.stack([entries.real, entries.imag], axis=1).ravel()
                 if form != "dense":
                     lines.append(f"{length:8d}{first:8d}" if form == "big" else f"{first + 65536 * length:12d}")
                 texts = [f"{entry:{width}.{digits}E}".replace("E", letter) for entry in entries]
@@ -89,6 +94,30 @@ def test_output4_in_text(form, count, digits, letter, matrices, tmp_path):
     for matrix, wanted in ((structure.stiffness, matrices["KAA"]), (structure.mass, matrices["MAA"])):
         printed = np.array([[float(f"{entry:.{digits}E}") for entry in row] for row in wanted])
         np.testing.assert_array_equal(matrix.toarray(), printed)
+
+
+@pytest.mark.parametrize("form", ["dense", "sparse", "big"])
+@pytest.mark.parametrize(("count", "digits", "letter"), [(3, 16, "E"), (5, 9, "E"), (3, 16, "D")])
+def test_complex_numbers_in_text_run_on_over_ends_of_lines(form, count, digits, letter, matrices, tmp_path):
+    """An odd number in a line: of every second value the imaginary part is in the next line. K and M are read too."""
+    complex_ones = {"KC": matrices["KAA"] * (1 + 0.02j), "GUST": (1.5 - 0.25j) * np.arange(1.0, 28.0).reshape(9, 3)}
+    given = {"KC": complex_ones["KC"], **matrices, "GUST": complex_ones["GUST"]}
+    (tmp_path / "job.op4").write_text(text_output4(given, form, count, digits, letter))
+    found = read_op4(tmp_path / "job.op4").matrices
+    for name, matrix in complex_ones.items():
+        np.testing.assert_allclose(found[name].toarray(), matrix, rtol=2 * 10.0**-digits)
+    structure = so.read_structure(tmp_path / "job.op4")
+    np.testing.assert_allclose(structure.stiffness.toarray(), matrices["KAA"], rtol=10.0**-digits)
+    with pytest.raises(so.InputError, match="stiffness is complex"):
+        so.read_structure(tmp_path / "job.op4", stiffness="KC")
+
+
+def test_half_a_complex_number_is_said(matrices, tmp_path):
+    lines = text_output4({**matrices, "KC": matrices["KAA"] * (1 + 0.02j)}, "dense", 3, 16).splitlines()
+    first = next(i for i, line in enumerate(lines) if "KC" in line) + 2
+    lines[first] = lines[first][: 2 * 23]
+    (tmp_path / "job.op4").write_text("\n".join(lines) + "\n")
+    refused(tmp_path / "job.op4", "half a complex number in column 1 of KC")
 
 
 def test_exponents_of_three_digits_have_no_letter(tmp_path):
@@ -177,10 +206,19 @@ def test_headers_that_do_not_fit(place, number, message, matrices, tmp_path):
 
 def test_a_name_that_occurs_twice(matrices, tmp_path):
     (tmp_path / "job.op4").write_bytes(2 * output4(matrices))
-    refused(tmp_path / "job.op4", "holds KAA twice")
+    refused(tmp_path / "job.op4", "holds MAA twice")
     once = output2(matrices, tables=False)[: -len(Machine().key(0))]
     (tmp_path / "job.op2").write_bytes(once + output2(matrices, label=False, tables=False))
-    refused(tmp_path / "job.op2", "holds KAA twice")
+    refused(tmp_path / "job.op2", "holds MAA twice")
+
+
+def test_a_load_that_occurs_twice_is_in_nobodys_way(matrices, tmp_path):
+    load = {"PG": np.arange(1.0, 10.0)[:, None]}
+    (tmp_path / "job.op4").write_bytes(output4({**load, **matrices}) + output4(load))
+    structure = so.read_structure(tmp_path / "job.op4")
+    np.testing.assert_array_equal(structure.stiffness.toarray(), matrices["KAA"])
+    with pytest.raises(so.InputError, match="holds PG twice"):
+        so.read_structure(tmp_path / "job.op4", stiffness="PG")
 
 
 @pytest.mark.parametrize("name", ["job.op4", "job.op2"])

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from suboctave.errors import InputError
+from suboctave.structures.contents import Unreadable
 
 #: forms of matrices by their numbers in Nastran: one whose entries beyond the diagonal are those before it
 SYMMETRIC = 6
@@ -68,6 +70,15 @@ class Columns:
             if bool(lower.nnz) != bool(upper.nnz):
                 return (matrix + (lower + upper).T).tocsr()
         return matrix
+
+
+def by_name(found: Iterable[Columns], file: str) -> dict[str, Any]:
+    """The matrices by their names; one that occurs twice is none."""
+    matrices: dict[str, Any] = {}
+    for one in found:
+        twice = one.name in matrices
+        matrices[one.name] = Unreadable(f"{file} holds {one.name} twice") if twice else one.matrix()
+    return matrices
 
 
 def _joined(parts: list[np.ndarray], kind: type) -> np.ndarray:

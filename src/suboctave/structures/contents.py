@@ -28,9 +28,18 @@ _NAMES = {
 _BEGINNINGS = {"mass": ("mass",), "stiffness": ("stif",), "damping": ("damp",), "structural": ("struct",)}
 
 
+@dataclass(frozen=True)
+class Unreadable:
+    """A matrix of a file that is none of a structure, such as a load: why, for whoever asks for it."""
+
+    reason: str
+
+
 @dataclass(frozen=True, eq=False)
 class Contents:
-    """Matrices of a file by their names, dense, sparse, or `LabelledEntries`; more of a structure, as its arguments."""
+    """Matrices of a file by their names, dense, sparse, `LabelledEntries` or `Unreadable`; more of a structure, as its
+    arguments.
+    """
 
     matrices: Mapping[str, Any]
     more: Mapping[str, Any] = field(default_factory=dict)
@@ -50,13 +59,13 @@ def matrix_of(matrices: Mapping[str, Any], what: str, name: str | None, file: st
     if name is not None:
         if name not in matrices:
             raise InputError(f"{file} holds no matrix {name!r}{suggest(name, matrices)}", (what,))
-        return matrices[name]
+        return _readable(matrices[name], what)
     candidates = sorted(name for name, matrix in matrices.items() if _means(name, what) and _is_square(matrix))
     if len(candidates) > 1:
         how = f"choose one with {what}={candidates[0]!r}"
         raise InputError(f"{file} holds several that may be the {what}, {', '.join(candidates)}: {how}", (what,))
     if candidates:
-        return matrices[candidates[0]]
+        return _readable(matrices[candidates[0]], what)
     if what in OPTIONAL:
         return None
     if set(matrices) == {""}:
@@ -65,13 +74,19 @@ def matrix_of(matrices: Mapping[str, Any], what: str, name: str | None, file: st
     raise InputError(f"{file} has no matrix named as a {what}, it has {there}; say which it is: {what}=", (what,))
 
 
+def _readable(matrix: Any, what: str) -> Any:
+    if isinstance(matrix, Unreadable):
+        raise InputError(matrix.reason, (what,))
+    return matrix
+
+
 def _means(name: str, what: str) -> bool:
     plain = name.replace("/", ".").rpartition(".")[2].lower().removesuffix("matrix").removesuffix("mat").strip("_ ")
     return plain in _NAMES[what] or plain.startswith(_BEGINNINGS[what])
 
 
 def _is_square(matrix: Any) -> bool:
-    if isinstance(matrix, LabelledEntries):
+    if isinstance(matrix, LabelledEntries | Unreadable):
         return True
     shape = tuple(matrix.shape)
     return len(shape) == 2 and len(set(shape)) == 1

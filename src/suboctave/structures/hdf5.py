@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from suboctave.errors import InputError
-from suboctave.structures.contents import Contents, compressed, labels_of
+from suboctave.structures.contents import Contents, Unreadable, compressed, labels_of
 
 
 def read_hdf5(path: Path) -> Contents:
@@ -41,7 +41,10 @@ def _walk(group: Any, prefix: str, file: str, matrices: dict[str, Any], arrays: 
             if array.ndim == 2 and array.dtype.kind in "fiuc":
                 matrices[place] = array
         elif isinstance(item, h5py.Group):
-            matrix = _sparse(item, f"{file}, {place}")
+            try:
+                matrix = _sparse(item, f"{file}, {place}")
+            except (InputError, ValueError) as error:
+                matrix = Unreadable(" ".join(str(error).split()))
             if matrix is None:
                 _walk(item, f"{place}/", file, matrices, arrays)
             else:

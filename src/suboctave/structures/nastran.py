@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from suboctave.errors import InputError
-from suboctave.structures.contents import Contents
+from suboctave.structures.contents import Contents, Unreadable
 from suboctave.structures.text_lines import fortran_number, text_of
 from suboctave.structures.triplets import LabelledEntries
 
@@ -22,6 +23,7 @@ _FORMS = {1, 6}
 def read_punch(path: Path) -> Contents:
     """All matrices of a .pch file, with node and component of their rows."""
     entries: dict[str, list[tuple[int, int, int, int, float]]] = {}
+    others: dict[str, Unreadable] = {}
     column: tuple[str, int, int] | None = None
     for number, line in enumerate(text_of(path).splitlines(), 1):
         text = line[:72].rstrip()
@@ -32,8 +34,12 @@ def read_punch(path: Path) -> Contents:
             if head.startswith("DMIG"):
                 name = fields[0]
                 if fields[1] == "0":
-                    _check_header(name, fields, path.name)
+                    other = _other(name, int(fields[2]), int(fields[3]), path.name)
+                    others |= {} if other is None else {name: other}
                     entries.setdefault(name, [])
+                    column = None
+                    continue
+                if name in others:
                     column = None
                     continue
                 column, fields = (name, int(fields[1]), int(fields[2] or 0)), fields[4:]
@@ -45,14 +51,14 @@ def read_punch(path: Path) -> Contents:
                 continue
             for node, component, value in _groups(fields):
                 entries[column[0]].append((node, component, *column[1:], value))
-        except InputError:
-            raise
         except (ValueError, IndexError):
             raise InputError(f"{path.name}, line {number} is no DMIG entry: {text[:60]!r}") from None
-    if not any(entries.values()):
+    if not others and not any(entries.values()):
         raise InputError(f"{path.name} holds no DMIG matrix")
-    matrices = {}
+    matrices: dict[str, Any] = dict(others)
     for name, rows in entries.items():
+        if name in others:
+            continue
         places = np.array([row[:4] for row in rows], dtype=np.int64).reshape(-1, 4)
         values = np.array([row[4] for row in rows], dtype=float)
         matrices[name] = LabelledEntries(places[:, :2], places[:, 2:], values)
@@ -69,12 +75,13 @@ def _fields(text: str) -> tuple[str, list[str]]:
     return text[:8].strip(), fields
 
 
-def _check_header(name: str, fields: list[str], file: str) -> None:
-    form, kind = int(fields[2]), int(fields[3])
+def _other(name: str, form: int, kind: int, file: str) -> Unreadable | None:
+    """Why a matrix of this form and type is none of a structure, such as a load; None where it is one."""
     if form not in _FORMS:
-        raise InputError(f"{file}: {name} is a matrix of form {form}; square (1) and symmetric (6) ones are read")
+        return Unreadable(f"{file}: {name} is a matrix of form {form}; square (1) and symmetric (6) ones are read")
     if kind > 2:
-        raise InputError(f"{file}: {name} is complex: punch its real part, and K4 for structural damping")
+        return Unreadable(f"{file}: {name} is complex: punch its real part, and K4 for structural damping")
+    return None
 
 
 def _groups(fields: list[str]) -> Iterator[tuple[int, int, float]]:

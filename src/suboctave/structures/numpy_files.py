@@ -18,8 +18,9 @@ from typing import Any
 
 import numpy as np
 
+from suboctave.errors import InputError, damage
 from suboctave.model.expressions.coefficients import Coefficient
-from suboctave.structures.contents import Contents, compressed, labels_of
+from suboctave.structures.contents import Contents, Unreadable, compressed, labels_of
 from suboctave.structures.damping import ModalDamping, Rayleigh
 from suboctave.structures.dof_map import DofMap
 from suboctave.structures.mesh import Mesh
@@ -39,7 +40,10 @@ def read_npz(path: Path) -> Contents:
     matrices = {name: array for name, array in arrays.items() if array.ndim == 2 and array.dtype.kind in "fiuc"}
     for name in {name.removesuffix("_indptr") for name in names if name.endswith("_indptr")}:
         parts = {part: arrays[f"{name}_{part}"] for part in _PARTS if f"{name}_{part}" in arrays}
-        matrices[name] = compressed(parts, by_columns=False, what=f"{path.name}, {name}")
+        try:
+            matrices[name] = compressed(parts, by_columns=False, what=f"{path.name}, {name}")
+        except (InputError, KeyError, ValueError) as error:
+            matrices[name] = Unreadable(f"{path.name}, {name} is no sparse matrix: {damage(error)}")
     return Contents(matrices, _more(arrays))
 
 

@@ -10,12 +10,11 @@ labels in them. Nastran DMAP Programmer's Guide, "OUTPUT2"; as pyYeti (nastran/o
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from suboctave.errors import InputError
-from suboctave.structures.columns import Columns
+from suboctave.structures.columns import Columns, by_name
 from suboctave.structures.contents import Contents
 from suboctave.structures.fortran import Records
 
@@ -38,14 +37,11 @@ def read_op2(path: Path) -> Contents:
         _expect(records, key, -1)
         _expect(records, _key(records), 0)
         key = _key(records) if records.more else 0
-    matrices: dict[str, Any] = {}
+    blocks: list[Columns | None] = []
     while key:
-        name, matrix = _data_block(records)
-        if matrix is not None:
-            if name in matrices:
-                raise InputError(f"{path.name} holds {name} twice")
-            matrices[name] = matrix.matrix()
+        blocks.append(_data_block(records))
         key = _key(records) if records.more else 0
+    matrices = by_name((block for block in blocks if block is not None), path.name)
     if not matrices:
         raise InputError(
             f"{path.name} holds no matrix such as KGG; write them to .op4, or punch them (EXTOUT, DMIGPCH)"
@@ -53,8 +49,8 @@ def read_op2(path: Path) -> Contents:
     return Contents(matrices)
 
 
-def _data_block(records: Records) -> tuple[str, Columns | None]:
-    """The name of a data block and its matrix, None for a table; the key before its name is read."""
+def _data_block(records: Records) -> Columns | None:
+    """The matrix of a data block, None for a table; the key before its name is read."""
     name = "".join(records.next().replace(b"\0", b" ").decode("ascii", "replace").split())
     _expect(records, _key(records), -1)
     _expect(records, _key(records), _TRAILER)
@@ -66,7 +62,7 @@ def _data_block(records: Records) -> tuple[str, Columns | None]:
     _expect(records, _key(records), 1)
     if not _key(records):
         _pass_over(records)
-        return name, None
+        return None
     matrix = Columns(name, trailer[2], trailer[1], trailer[3], trailer[4], records.file)
     number = records.kind("f") if matrix.type % 2 else records.kind("f", 8)
     column = 0
@@ -80,7 +76,7 @@ def _data_block(records: Records) -> tuple[str, Columns | None]:
         if not _key(records):
             break
     _expect(records, _key(records), 0)
-    return name, matrix
+    return matrix
 
 
 def _pass_over(records: Records) -> None:

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from suboctave.errors import InputError
-from suboctave.structures.columns import Columns
+from suboctave.structures.columns import Columns, by_name
 from suboctave.structures.contents import Contents
 from suboctave.structures.fortran import Records
 from suboctave.structures.text_lines import fortran_number, text_of
@@ -30,14 +30,10 @@ _USUAL = 23
 def read_op4(path: Path) -> Contents:
     """All matrices of an .op4 file."""
     records = Records(path, {24: 4, 48: 8})
-    matrices: dict[str, Columns] = {}
-    for matrix in _binary(records) if records.order else _text(path):
-        if matrix.name in matrices:
-            raise InputError(f"{path.name} holds {matrix.name} twice")
-        matrices[matrix.name] = matrix
+    matrices = by_name(_binary(records) if records.order else _text(path), path.name)
     if not matrices:
         raise InputError(f"{path.name} holds no matrix")
-    return Contents({name: matrix.matrix() for name, matrix in matrices.items()})
+    return Contents(matrices)
 
 
 def _binary(records: Records) -> list[Columns]:
@@ -84,7 +80,9 @@ def _strings(
 
 
 def _text(path: Path) -> list[Columns]:
-    """Lines of values have decimal points, all others are whole numbers."""
+    """Lines of values have decimal points, all others are whole numbers; a value of two parts may run on over the end
+    of a line.
+    """
     lines = text_of(path).splitlines()
     found: list[Columns] = []
     at = 0
@@ -105,18 +103,20 @@ def _text(path: Path) -> list[Columns]:
         stated = _FORMAT.search(header[40:])
         width = int(stated[1]) if stated else _USUAL
         column = row = 0
+        values: list[float] = []
         while column <= columns:
             line = next_line()
-            if "." not in line:
-                numbers = [int(word) for word in line.split()]
-                if len(numbers) == 3:
-                    column, row = numbers[:2]
-                else:
-                    row = numbers[1] if len(numbers) == 2 else numbers[0] % _BIG
+            if "." in line:
+                values += [fortran_number(line[i : i + width]) for i in range(0, len(line.rstrip()), width)]
                 continue
-            values = [fortran_number(line[i : i + width]) for i in range(0, len(line.rstrip()), width)]
-            found[-1].add(row, column, np.array(values))
-            row += len(values)
+            if values:
+                found[-1].add(row, column, np.array(values))
+                values = []
+            numbers = [int(word) for word in line.split()]
+            if len(numbers) == 3:
+                column, row = numbers[:2]
+            else:
+                row = numbers[1] if len(numbers) == 2 else numbers[0] % _BIG
         next_line()  # the value of the column beyond the last
     return found
 

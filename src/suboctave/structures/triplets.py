@@ -62,6 +62,30 @@ def from_triplets(rows: Any, columns: Any, values: Any, n: int, what: str) -> An
     return scipy.sparse.csr_array((values, (rows, columns)), shape=(n, n))
 
 
+def mirrored(matrix: Any, symmetry: str, file: str) -> Any:
+    """A matrix, sparse or dense, whose header says "symmetric", "skew-symmetric" or "hermitian", from one triangle; one
+    that is "general" as it is.
+
+    Raises `InputError` where both triangles have entries.
+    """
+    import scipy.sparse
+
+    if symmetry == "general":
+        return matrix
+    sparse = scipy.sparse.issparse(matrix)
+    lower, upper = (scipy.sparse.tril, scipy.sparse.triu) if sparse else (np.tril, np.triu)
+    below, above = lower(matrix, -1), upper(matrix, 1)
+    if matrix.shape[0] != matrix.shape[1]:
+        raise InputError(
+            f"{file} says that it is {symmetry}, but has {matrix.shape[0]} rows and {matrix.shape[1]} columns"
+        )
+    if abs(below).sum() and abs(above).sum():
+        raise InputError(f"{file} says that it is {symmetry}, but has entries on both sides of the diagonal")
+    off = (below + above).T
+    other = {"symmetric": off, "skew-symmetric": -off, "hermitian": off.conj()}[symmetry]
+    return (matrix + other).tocsr() if sparse else matrix + other
+
+
 def put_together(
     given: Mapping[str, LabelledEntries], files: Mapping[str, str], order: DofMap | None
 ) -> tuple[dict[str, Any], Sequence[Label]]:

@@ -1,6 +1,6 @@
 """The [system] of a study file: read, and every mistake in it with its line.
 
-Matrices are numbers and expressions inline, or files beside the study (.npy, .npz, .mtx, .mat, .csv).
+Matrices are numbers and expressions inline, or files beside the study: those of structures, and .csv.
 """
 
 from __future__ import annotations
@@ -8,7 +8,6 @@ from __future__ import annotations
 import inspect
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,12 +20,13 @@ from suboctave.model.description import build_part
 from suboctave.model.loads import StaticLoad
 from suboctave.model.matrices import matrix_coefficient
 from suboctave.model.system import System
+from suboctave.structures import files as structures
 from suboctave.structures.structure import Structure
 from suboctave.study.mistakes import Mistakes, Section
 from suboctave.study.structures import DofNames, given_structure
 
 MATRICES = ("mass", "damping", "stiffness", "structural")
-SUFFIXES = (".npy", ".npz", ".mtx", ".mat", ".csv")
+SUFFIXES = (*structures.ENDINGS, ".csv")
 
 
 class SystemSection(Section):
@@ -50,9 +50,9 @@ class SystemSection(Section):
 
 def published() -> dict[str, Any]:
     """The systems of `so.library` and the published ones of `so.structures`, by name."""
-    from suboctave.structures import published as structures
+    from suboctave.structures import published as public
 
-    functions = {name: getattr(room, name) for room in (library, structures) for name in room.__all__}
+    functions = {name: getattr(room, name) for room in (library, public) for name in room.__all__}
     return {n: f for n, f in functions.items() if inspect.signature(f).return_annotation in ("System", System)}
 
 
@@ -248,49 +248,18 @@ def _number_in(text: str) -> float | str:
 
 def read_matrix(path: Path, key: str | None) -> Any:
     """A matrix from a file, dense or sparse; `key` names it where the file holds several. Raises InputError."""
-    suffix = path.suffix.lower()
-    if suffix not in SUFFIXES:
-        raise InputError(f"{path.name}: matrices are read from {', '.join(SUFFIXES)} files")
+    if not path.is_file() and path.suffix.lower() not in SUFFIXES:
+        raise InputError(f"there is no file {path}; matrices are read from {', '.join(SUFFIXES)} files")
     if not path.is_file():
         beside = [p.name for p in path.parent.glob("*") if p.suffix.lower() in SUFFIXES]
         raise InputError(f"there is no file {path}{suggest(path.name, beside)}")
     try:
-        matrix = _loaded(path, suffix, key)
-    except InputError:
-        raise
+        if path.suffix.lower() == ".csv":
+            matrix = np.loadtxt(path, delimiter=",", ndmin=2)
+        else:
+            matrix = structures.read_matrix(path, key)
     except Exception as error:  # whatever a damaged file makes of its reader
-        raise InputError(f"cannot read {path}: {damage(error)}") from None
-    if not hasattr(matrix, "tocsr"):
-        matrix = np.asarray(matrix)
-        if matrix.dtype.kind not in "fiu":
-            raise InputError(f"{path}: the matrix holds {matrix.dtype}, not real numbers")
+        raise InputError(f"cannot read {path}: {error if isinstance(error, InputError) else damage(error)}") from None
+    if np.iscomplexobj(matrix):
+        raise InputError(f"{path.name}: the matrix holds complex numbers, not real ones")
     return matrix
-
-
-def _loaded(path: Path, suffix: str, key: str | None) -> Any:
-    import scipy.io
-    import scipy.sparse
-
-    if suffix == ".csv":
-        return np.loadtxt(path, delimiter=",", ndmin=2)
-    readers: dict[str, Any] = {".mtx": scipy.io.mmread, ".mat": scipy.io.loadmat}
-    matrix = readers.get(suffix, partial(np.load, allow_pickle=False))(path)
-    if suffix == ".npz":
-        with matrix as archive:
-            is_sparse = {"format", "shape", "data"} <= set(archive.files)
-            matrix = scipy.sparse.load_npz(path) if is_sparse else archive[_chosen(path, key, archive.files)]
-    elif suffix == ".mat":
-        matrix = matrix[_chosen(path, key, [name for name in matrix if not name.startswith("__")])]
-    if hasattr(matrix, "check_format"):  # a damaged file may give indices outside of the matrix
-        matrix.check_format(full_check=True)
-    return matrix.tocsr() if hasattr(matrix, "tocsr") else matrix
-
-
-def _chosen(path: Path, key: str | None, names: list[str]) -> str:
-    if key is None and len(names) == 1:
-        return names[0]
-    if key is None:
-        raise InputError(f"{path} holds {', '.join(sorted(names)) or 'nothing'}: choose one with key=")
-    if key not in names:
-        raise InputError(f"{path} holds no {key!r}{suggest(str(key), names)}")
-    return key
