@@ -22,8 +22,19 @@ Key = tuple[str | int, ...]
 GivenDof: TypeAlias = int | str | tuple[int | str, int | str]
 
 
+def printable(text: str) -> str:
+    r"""A text that can be printed and saved: bytes of a file name that are no UTF-8 are written as \xe4."""
+    try:
+        return text.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
+    except UnicodeEncodeError:  # half a character that no file name has
+        return text.encode("utf-8", "backslashreplace").decode("utf-8")
+
+
 class SuboctaveError(Exception):
     """Anything that this package refuses or cannot do."""
+
+    def __str__(self) -> str:
+        return printable(super().__str__())
 
 
 class InputError(SuboctaveError, ValueError):

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -133,6 +135,40 @@ def test_a_name_too_long_for_the_disk(command, suboctave, tmp_path):
     assert (status, out) == (2, "")
     assert "too long" in err
     assert "Errno" not in err
+
+
+@pytest.mark.skipif(os.name != "posix", reason="names of files are texts")
+def test_a_name_that_is_no_utf8(tmp_path):
+    """Everything that prints or saves it, on a terminal that takes UTF-8 alone."""
+    name = os.fsdecode(b"tr\xe4ger")
+    text = DUFFING.split('[[analyses]]\nname = "up"')[0] + '\n[outputs]\nhtml = "a.html"\n'
+    (tmp_path / f"{name}.toml").write_text(text, encoding="utf-8")
+    environment = {**os.environ, "PYTHONIOENCODING": "utf-8:strict", "PYTHONUTF8": "1"}
+
+    def call(*arguments):
+        command = [sys.executable, "-m", "suboctave", *arguments]
+        return subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+
+    for command, file in (("run", f"{name}.toml"), ("show", f"{name}_results/results.nc"), ("new", f"{name}2.toml")):
+        answer = call(command, file)
+        assert (answer.returncode, answer.stderr) == (0, "")
+    answer = call("check", f"{name}3.toml")
+    assert (answer.returncode, "tr\\xe4ger3.toml" in answer.stderr) == (2, True)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="names of files are texts")
+def test_a_structure_of_such_a_name_prints_and_is_saved(tmp_path):
+    path = tmp_path / os.fsdecode(b"tr\xe4ger.npz")
+    np.savez(path, M=np.eye(2), K=np.array([[2.0, -1.0], [-1.0, 2.0]]))
+    structure = so.read_structure(path)
+    assert structure.name == "tr\\xe4ger"
+    system = structure.system([so.CubicSpring(0, 1.0)], [so.HarmonicLoad(0, 0.1)])
+    str(system).encode("utf-8")
+    structure.save(path)
+    assert so.read_structure(path).name == structure.name
+    with pytest.raises(so.InputError, match="no file") as caught:
+        so.read_structure(tmp_path / os.fsdecode(b"gr\xf6\xdfe.npz"))
+    str(caught.value).encode("utf-8")
 
 
 @pytest.mark.parametrize("share", [0.0, 0.01, 0.5, 0.99])

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from suboctave.errors import InputError, is_number, path_of, suggest
+from suboctave.errors import InputError, is_number, path_of, printable, suggest
 from suboctave.model.elements.base import Array
 
 _UNITS = {"rad/s": 1.0, "Hz": 2.0 * math.pi}
@@ -87,7 +87,7 @@ def read_measured(
     return Measured(
         table[:, 0] * (_UNITS[frequency_unit] * omega_scale),
         table[:, 1] * scale,
-        place.stem if label is None else label,
+        printable(place.stem) if label is None else label,
     )
 
 

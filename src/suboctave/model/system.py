@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from suboctave.errors import InputError, Key, Refusals, is_number, located, shortened, suggest
+from suboctave.errors import InputError, Key, Refusals, is_number, located, printable, shortened, suggest
 from suboctave.model.description import Arrays, build_part, describe_part, from_plain, plain_value
 from suboctave.model.elements.base import Array, BaseElement
 from suboctave.model.elements.smoothness import CornerSampling, PiecewiseLinear, SharpVelocitySampling
@@ -88,7 +88,7 @@ class System:
             elements=sorted(_several(elements, BaseElement, "Element", "elements"), key=lambda e: e.own_nodes),
             loads=_several(loads, Load, "HarmonicLoad", "loads"),
             parameters=_read_parameters(parameters),
-            name=str(name),
+            name=printable(str(name)),
             dof_names=_read_dof_names(dof_names, read.n),
             units=UnitSystem.of(units),
         )

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from suboctave.errors import InputError, located, path_of, shortened
+from suboctave.errors import InputError, located, path_of, printable, shortened
 from suboctave.model.elements.base import Array, BaseElement
 from suboctave.model.expressions.coefficients import Coefficient, named_coefficient
 from suboctave.model.loads import Load
@@ -74,7 +74,13 @@ class Structure:
             structural = named_coefficient(structural, "Structure", "structural")
         elif structural is not None:
             structural = symmetric_matrix(square_matrix(structural, "structural", n), "structural", labels)
-        read = {"mass": mass, "stiffness": stiffness, "damping": damping, "dofs": labels, "name": str(self.name)}
+        read = {
+            "mass": mass,
+            "stiffness": stiffness,
+            "damping": damping,
+            "dofs": labels,
+            "name": printable(str(self.name)),
+        }
         read["structural"] = structural
         for field, value in read.items():
             object.__setattr__(self, field, value)

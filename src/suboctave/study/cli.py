@@ -5,6 +5,7 @@ Everything heavy is imported when a command runs, so that `--help` and a mistype
 `--json` the answer is one JSON object on stdout, errors included.
 """
 
+import io
 import json
 import sys
 import warnings
@@ -16,7 +17,7 @@ from typing import Annotated, Any
 import typer
 
 from suboctave.atomic import free_place
-from suboctave.errors import InputError, NegativeDampingWarning, SuboctaveError, suggest
+from suboctave.errors import InputError, NegativeDampingWarning, SuboctaveError, printable, suggest
 from suboctave.interruption import Interruption
 from suboctave.version import __version__
 
@@ -70,7 +71,7 @@ def new(
     if example not in texts:
         raise InputError(f"there is no example {example!r}{suggest(example, texts)}")
     target = free_place(path, overwrite, (".toml",))
-    text = texts[example].replace("THIS_FILE", str(path))
+    text = texts[example].replace("THIS_FILE", printable(str(path)))
     replace_file(target, lambda place: place.write_text(text, encoding="utf-8"))
     if not _answered(json_wanted, {"file": target, "example": example}):
         console().print(f"{target} is written; run it: suboctave run {target}", soft_wrap=True)
@@ -353,11 +354,11 @@ def _show_page(path: Path, allow_code: bool) -> None:
     from suboctave.study.screen import console
     from suboctave.study.served import served, show_in_browser, wait_for_ctrl_c
 
-    results = load(path, allow_code=allow_code)
-    shown = shown_on_page(results) if isinstance(results, Results) else {path.stem: results}
+    results, called = load(path, allow_code=allow_code), printable(path.stem)
+    shown = shown_on_page(results) if isinstance(results, Results) else {called: results}
     if not shown:
         raise InputError(f"{path} holds nothing that a page could show")
-    title = str(results.attributes.get("title") or path.stem) if isinstance(results, Results) else path.stem
+    title = str(results.attributes.get("title") or called) if isinstance(results, Results) else called
     text = page_of(shown, title)
     with served(lambda: text) as address:
         console().print(f"{address} shows {path} to this machine alone; Ctrl-C ends it", soft_wrap=True)
@@ -377,7 +378,7 @@ def _show_results(path: Path, csv: Path | None, overwrite: bool, allow_code: boo
         _show_sweep(path, results, csv, overwrite, json_wanted)
         return
     if not isinstance(results, Results):
-        results = Results({path.stem: results if isinstance(results, Result) else results.to_table()})
+        results = Results({printable(path.stem): results if isinstance(results, Result) else results.to_table()})
     written = write_tables(results, csv, overwrite) if csv is not None else []
     listed = {name: as_plain(item) for name, item in results.items()} if json_wanted else {}
     if _answered(json_wanted, {"attributes": results.attributes, "analyses": listed, "files": written}):
@@ -422,7 +423,7 @@ def _show_study(path: Path, allow_code: bool, json_wanted: bool) -> None:
     if _answered(json_wanted, head | {"analyses": steps}):
         return
     screen = console()
-    screen.print(study.title or study.source.name, style="bold")
+    screen.print(study.title or study.called, style="bold")
     screen.print(repr(study.system))
     screen.print("\nanalyses", style="bold")
     for step in study.steps:
@@ -498,6 +499,8 @@ def compile_command() -> None:
 
 def main() -> None:
     """Runs the command line. A failure is one readable message and an exit status, never a traceback."""
+    if isinstance(sys.stdout, io.TextIOWrapper):  # names of files need not be UTF-8
+        sys.stdout.reconfigure(errors="backslashreplace")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("once", NegativeDampingWarning)

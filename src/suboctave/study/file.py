@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field, ValidationError
 
-from suboctave.errors import Key, path_of, suggest
+from suboctave.errors import Key, path_of, printable, suggest
 from suboctave.harmonic.condensed import condense
 from suboctave.harmonic.linear_part import LinearPart
 from suboctave.model.system import System, describe
@@ -109,6 +109,11 @@ class Study:
                 system = self.system.with_parameters(step.parameters) if step.parameters else self.system
                 return condense(system, tuple(np.atleast_1d(omega)), **kept, observe=() if observe is None else observe)
         return None
+
+    @property
+    def called(self) -> str:
+        """The name of the study file, as it is printed and saved."""
+        return printable(self.source.name)
 
     @property
     def folder(self) -> Path:

@@ -136,7 +136,7 @@ def run_study(
     with closing(opened(journal_at)) as journal:
         for torn in place.glob(f".{study.outputs.results}-*.part"):  # half a file of a run that was killed
             torn.unlink(missing_ok=True)
-        journal.append("run", {"study": study.text, "title": study.title, "source": study.source.name})
+        journal.append("run", {"study": study.text, "title": study.title, "source": study.called})
         with time_limit(seconds) as limit:
             for step in study.steps:
                 whole = unfinished.isdisjoint(name for _, name in step.needs())

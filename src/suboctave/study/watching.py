@@ -58,7 +58,7 @@ class Watching:
 
     def finish(self, outcome: Outcome) -> None:
         """The run is over: from now on its report is shown, or what failed."""
-        title, results = self.study.title or self.study.source.name, Results(outcome.results)
+        title, results = self.study.title or self.study.called, Results(outcome.results)
         shown, failures = shown_on_page(results), outcome.failures
         if shown:
             self.ended = page_of(shown, title, failures)
@@ -94,7 +94,7 @@ class Watching:
         ]
         pictures = [(name, self._still(name, own)) for name, own in curves.items()]
         text: str = template("watch.html").render(
-            title=self.study.title or self.study.source.name,
+            title=self.study.title or self.study.called,
             seconds=f"{perf_counter() - self.since:.0f}",
             refresh=REFRESH,
             rows=rows,
