@@ -58,6 +58,23 @@ def test_a_dof_that_is_not_there_is_told_with_what_is_near(structure, place, mes
         structure.dof(*place)
 
 
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ([(1, ["z"])], "a direction is one of x, y, z"),
+        ([(1, {"z": 1})], "a direction is one of x, y, z"),
+        ([(1, np.array([3]))], "a direction is one of x, y, z"),
+        ([([1], "z")], "a node is a whole number or a text"),
+        ([({}, "z")], "a node is a whole number or a text"),
+    ],
+)
+def test_labels_that_are_none(given, message):
+    with pytest.raises(so.InputError, match=message):
+        so.DofMap(given)
+    with pytest.raises(so.InputError, match=message):
+        so.DofMap([(1, "x")], fixed=given)
+
+
 def test_nodes_may_be_texts_and_negative():
     dofs = so.DofMap([("plate.12", "x"), ("Plate.13", "x"), (-4, "z"), (5, "temperature")])
     assert (dofs.index("PLATE.12", "x"), dofs.index("-4", "z"), dofs.index(5, "Temperature")) == (0, 2, 3)

@@ -137,6 +137,7 @@ def test_a_name_too_long_for_the_disk(command, suboctave, tmp_path):
     assert "Errno" not in err
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="names of files are texts")
 def test_a_name_that_is_no_utf8(tmp_path):
     """Everything that prints or saves it, on a terminal that takes UTF-8 alone."""

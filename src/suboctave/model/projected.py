@@ -14,6 +14,7 @@ Bampton's coordinates, within the span of the basis.
 from __future__ import annotations
 
 import copy
+import operator
 from collections.abc import Sequence
 from typing import Any
 
@@ -218,8 +219,8 @@ def coordinates_along(shapes: Array, read: Array, matrices: tuple[Array, Array],
 class Recovered(np.lib.mixins.NDArrayOperatorsMixin):
     """Displacements (..., n) or states (..., 2 n) of a structure that are kept as coordinates, an array as it is read.
 
-    An index makes the part that it asks for, `np.asarray(...)`, functions of NumPy and operators all of it. `shapes`
-    (n, r) times the first r coordinates are the displacements.
+    An index makes the part that it asks for; `np.asarray(...)`, functions of NumPy, operators, and what else an array
+    has (`T`, `max`, `mean`) all of it. `shapes` (n, r) times the first r coordinates are the displacements.
     """
 
     def __init__(self, coordinates: NDArray[Any], shapes: Array) -> None:
@@ -254,14 +255,40 @@ class Recovered(np.lib.mixins.NDArrayOperatorsMixin):
         return self.shape[0]
 
     def __getitem__(self, key: Any) -> Any:
-        keys = list(key) if isinstance(key, tuple) else [key]
-        if any(one is Ellipsis for one in keys):
-            at = next(i for i, one in enumerate(keys) if one is Ellipsis)
-            taken = sum(_axes(one) for one in keys) - 1
-            keys[at : at + 1] = [slice(None)] * (self.ndim - taken)
-        whole = sum(_axes(one) for one in keys) < self.ndim
-        last = slice(None) if whole else keys.pop()
-        return self._displaced(self.coordinates[tuple(keys)] if keys else self.coordinates, last)
+        keys = [_index(one) for one in (key if isinstance(key, tuple) else (key,))]
+        taken = sum(_axes(one) for one in keys)
+        dots = sum(one is Ellipsis for one in keys)
+        if dots > 1 or taken > self.ndim:
+            raise IndexError(f"an index of {taken} axes and {dots} ellipses for an array of {self.ndim} axes")
+        keys += [Ellipsis] * (1 - dots)
+        at = next(i for i, one in enumerate(keys) if one is Ellipsis)
+        keys[at : at + 1] = [slice(None)] * (self.ndim - taken)
+        arrays = [one for one in keys if isinstance(one, np.ndarray)]
+        numbered = any(isinstance(one, int) for one in (keys[:-1] if arrays and keys[0] is arrays[0] else keys))
+        if arrays and (len(arrays) > 1 or arrays[0].ndim != 1 or numbered or any(one is None for one in keys)):
+            return self._one_by_one(tuple(keys))
+        *first, last = [one for one in keys if one is not None]
+        part = self._displaced(self.coordinates[tuple(first)], last)
+        new_axes = tuple(one if one is None else slice(None) for one in keys if one is None or isinstance(one, slice))
+        return part[new_axes] if None in new_axes else part
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_") or not hasattr(np.ndarray, name):
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        whole = np.asarray(self)
+        whole.setflags(write=False)  # what changes an array in place changes none of the coordinates
+        return getattr(whole, name)
+
+    def _one_by_one(self, keys: tuple[Any, ...]) -> NDArray[Any]:
+        """Single entries, of which the indices are chosen along several axes at once."""
+        n, r = self.shapes.shape
+        along = np.meshgrid(*map(np.arange, self.shape), indexing="ij", sparse=True)
+        *first, last = (np.broadcast_to(places, self.shape)[keys] for places in along)
+        coordinates, rows = self.coordinates[tuple(first)], self.shapes[last % n]
+        result: NDArray[Any] = np.einsum("...i,...i", coordinates[..., :r], rows)
+        if self.states:
+            result = np.where(last < n, result, np.einsum("...i,...i", coordinates[..., r:], rows))
+        return result
 
     def _displaced(self, coordinates: NDArray[Any], last: Any) -> Any:
         n, r = self.shapes.shape
@@ -285,8 +312,20 @@ class Recovered(np.lib.mixins.NDArrayOperatorsMixin):
         return f"Recovered({self.shape}, from {self.shapes.shape[1]} coordinates)"
 
 
+def _index(key: Any) -> Any:
+    """An index as a slice, an int, None, the ellipsis, or an array."""
+    if key is None or key is Ellipsis or isinstance(key, slice):
+        return key
+    array = np.asarray(key)
+    if array.ndim == 0 and array.dtype != bool:
+        return operator.index(key)
+    return array if array.size else array.astype(bool if array.dtype == bool else int)
+
+
 def _axes(key: Any) -> int:
     """How many axes an index takes."""
+    if key is None or key is Ellipsis:
+        return 0
     return key.ndim if isinstance(key, np.ndarray) and key.dtype == bool else 1
 
 

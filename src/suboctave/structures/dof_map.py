@@ -234,14 +234,14 @@ def _labels(given: Any) -> tuple[Label, ...]:
     nodes: dict[Any, Node] = {}
     read = []
     for node, direction in pairs:
-        try:
-            label = nodes.get(node)
-        except TypeError:
-            label = None
-        if label is None or isinstance(node, bool):
+        # thousands of labels are the same few texts and numbers, of which nothing else is kept
+        label = nodes.get(node) if type(node) in (int, str) else None
+        if label is None:
             label = node_label(node)
-            nodes[node] = label
-        read.append((label, _OTHER_NAMES.get(direction) or direction_label(direction)))
+            if type(node) in (int, str):
+                nodes[node] = label
+        known = _OTHER_NAMES.get(direction) if isinstance(direction, str) else None
+        read.append((label, known or direction_label(direction)))
     return tuple(read)
 
 
