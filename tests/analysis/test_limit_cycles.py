@@ -11,6 +11,7 @@ from suboctave.curves.kinds.free_phase import FreePhaseOperator
 from suboctave.curves.kinds.limit_cycle import LimitCycle
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.tracked.start import curve_through
+from suboctave.pictures.tables import notes_on
 from suboctave.timedomain import shoot_cycle
 
 pytestmark = pytest.mark.filterwarnings("ignore::suboctave.NegativeDampingWarning")
@@ -128,6 +129,7 @@ def test_a_torus_bifurcation_against_shooting_and_averaging():
     for i in (0, len(curve) // 2, -1):
         moduli = np.abs(exact(curve.orbits[i]).multipliers)
         assert np.sort(np.abs(moduli - 1.0))[2] < 1e-6  # the trivial one and the pair
+    assert not any("Unsettled" in note for note in notes_on(curve.to_xarray()))
     assert curve.plane == ("mu", "m")
 
 
@@ -152,6 +154,10 @@ def test_a_period_doubling_against_shooting_and_followed(doubling):
     for i in (0, -1):
         assert np.abs(exact(border.orbits[i]).multipliers + 1.0).min() < 1e-6
     assert border.stable.all()
+    for curve in (doubling, border):
+        # the multiplier +1 of a free phase is known to be one: that its error reaches the circle says nothing
+        assert (np.abs(curve.multipliers - 1.0).min(axis=1) <= curve.multiplier_errors.max(axis=1)).any()
+        assert not any("Unsettled" in note for note in notes_on(curve.to_xarray()))
 
 
 def test_all_amplitudes_at_a_hopf_point_without_nonlinear_forces():

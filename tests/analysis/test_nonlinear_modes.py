@@ -11,6 +11,7 @@ from scipy.optimize import brentq, fsolve
 from scipy.special import ellipk
 
 import suboctave as so
+from suboctave.pictures.tables import notes_on
 from suboctave.study.file import read_study
 from suboctave.study.runner import run_study
 
@@ -429,3 +430,13 @@ def test_a_damped_mode_whose_spring_moves_little(n):
     assert mode.damping_ratio[0] == pytest.approx(0.01 / w + 0.0005 * w, rel=1e-4)
     free = so.nonlinear_mode(system, 1, amplitude=(0.01, 0.3), damped=False)
     assert mode.omega[-1] == pytest.approx(free.omega[-1], rel=1e-6)
+
+
+def test_a_page_takes_the_multipliers_of_a_conserved_energy_for_what_they_are():
+    """Energy and phase make two multipliers +1, and pairs of the others stay on the unit circle: no verdict is open."""
+    system = so.System(np.eye(2), np.zeros((2, 2)), [[2.0, -1.0], [-1.0, 2.0]], [so.CubicSpring(0, 0.5)])
+    for mode in (1, 2):
+        curve = so.nonlinear_mode(system, mode, amplitude=(0.05, 0.8))
+        assert (np.abs(np.abs(curve.multipliers) - 1.0) <= curve.multiplier_errors).any(axis=1).all()
+        assert not curve.multiplier_open.any()
+        assert not notes_on(curve.to_xarray())

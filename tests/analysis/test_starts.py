@@ -145,3 +145,36 @@ def test_impossible_start_says_what_was_tried():
         so.ConvergenceError, match=r"no motion found to start from at omega = 1.*linear response.*start="
     ):
         so.frequency_response(system, (1.0, 2.0))
+
+
+@pytest.fixture(scope="module")
+def hardening():
+    """A Duffing oscillator that folds at omega = 2.3996 and 1.3292, and its response."""
+    system = so.System(1.0, 0.05, 1.0, [so.CubicSpring(0, 1.0)], [so.HarmonicLoad(0, 0.3)])
+    return system, so.frequency_response(system, (0.5, 3.5), 5)
+
+
+def test_a_motion_from_elsewhere_starts_no_curve_outside_the_range(hardening):
+    """From motions all along the response: a curve in the range, or a refusal that says where the nearest motion is."""
+    (system, response), bounds, refused = hardening, (1.2, 0.8), 0
+    for start in response.orbits[::6]:
+        try:
+            curve = so.frequency_response(system, bounds, 5, start=start)
+        except so.ConvergenceError as failure:
+            refused += "the nearest one lies at omega" in str(failure)
+            continue
+        assert curve.omega[0] == bounds[0]
+        assert min(bounds) <= curve.omega.min() <= curve.omega.max() <= max(bounds)
+    assert refused
+
+
+def test_the_nearest_motion_in_the_range_is_said_to_be_no_start(hardening):
+    """A motion of a stronger load at 2.7: beside it the large ones of the weaker load end at 2.3996, in the range."""
+    system, _ = hardening
+    strong = so.System(1.0, 0.05, 1.0, [so.CubicSpring(0, 1.0)], [so.HarmonicLoad(0, 0.5)])
+    high = so.frequency_response(strong, (0.5, 2.7), 5)
+    start = high.orbits[int(np.argmax(high.amplitude * (high.omega <= 2.7)))]
+    curve = so.frequency_response(system, (2.7, 0.8), 5, start=start)
+    assert curve.omega.max() <= 2.7
+    elsewhere = bool(abs(curve.omega[0] - 2.7) > 1e-3)
+    assert any("the curve begins at the nearest one" in note for note in curve.warnings) is elsewhere

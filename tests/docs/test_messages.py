@@ -44,7 +44,6 @@ INTERNAL = (
     "where the isola ends turns into another kind of point",
     "no node",
     "the motion of {} load periods at {} was not found again",
-    "next to a limit point the nearest motion",
     "this {} has no complex pair",
     "no limit point of the doubled motions was found",
 )

@@ -238,3 +238,23 @@ def test_a_branch_of_twice_the_period_that_leads_elsewhere_ends_isolation():
     assert carrier_of(part, [], {}) is part
     assert carrier_of(part, [branch], {}) is None
     assert carrier_of(whole, [branch], {}) is whole  # leaves it and comes back
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", ["a mass at rest", "a node", "rest"])
+def test_a_check_where_something_is_at_rest(case):
+    """Nothing couples the second mass; the middle one is a node; a swing stands still below its tongue."""
+    if case == "a mass at rest":
+        mass, damping, stiffness = np.eye(2), 0.1 * np.eye(2), np.diag([1.0, 3.0])
+        parts = [so.CubicSpring(0, 0.5)], [so.HarmonicLoad(0, "F")]
+    elif case == "a node":
+        mass, damping = np.eye(3), 0.1 * np.eye(3)
+        stiffness = [[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 2.0]]
+        parts = [so.CubicSpring(i, 0.5) for i in (0, 2)], [so.HarmonicLoad(direction=[1, 0, -1], amplitude="F")]
+    else:
+        mass, damping, stiffness, parts = 1.0, 0.1, 1.0, ([so.Expression(0, "F*x*cos(omega*t) + x**3")], [])
+    system = so.System(mass, damping, stiffness, *parts, parameters={"F": 0.2})
+    found = so.regime_map(system, (1.5, 2.5), "F", (0.1, 0.4), 5, depth=1, values=2)
+    checked = found.check(points=4)
+    assert checked.landings
+    assert checked.rate == checked.agreeing == 1.0

@@ -127,11 +127,11 @@ def test_what_users_write_is_text(duffing, tmp_path):
 def test_origin_and_doubts_are_stated(page, duffing):
     data = duffing().assign_attrs(warnings="first warning\nsecond warning", seconds=1.25, newton="tolerance 1e-10")
     points = data.sizes["point"]
-    errors = np.full((points, 2), 1e-9)
-    multipliers = np.full((points, 2), 0.5 + 0.0j)
-    multipliers[7, 0] = 1.0 - 1e-12
-    data["multipliers"] = (("point", "multiplier"), multipliers)
-    data["multiplier_errors"] = (("point", "multiplier"), errors)
+    data["multipliers"] = (("point", "multiplier"), np.full((points, 2), 0.5 + 0.0j))
+    data["multiplier_errors"] = (("point", "multiplier"), np.full((points, 2), 1e-9))
+    doubtful = np.zeros((points, 2), dtype=bool)
+    doubtful[7, 0] = True
+    data["multiplier_open"] = (("point", "multiplier"), doubtful)
     words = " ".join(page({"curve": data}).words)
     for expected in ("first warning", "second warning", "1.25 s", "tolerance 1e-10", "c = 0.1", "suboctave 0"):
         assert expected in words

@@ -42,6 +42,7 @@ def branch(stable, bifurcations, events=()):
         truncation=np.zeros(count),
         multipliers=np.zeros((count, 4), dtype=complex),
         multiplier_errors=np.full((count, 4), 1e-7),
+        multiplier_open=np.zeros((count, 4), dtype=bool),
         stability_methods=["monodromy"] * count,
         arclength=np.arange(float(count)),
         bifurcations=bifurcations,

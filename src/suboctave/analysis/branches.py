@@ -163,7 +163,8 @@ def continue_branch(
             # two branches cross: go on along that on which the point was found
             trace = leave_along(crossing, curve, np.array(crossing.tangent), run)
         else:
-            point = start_point(curve, min(max(ends), max(min(ends), value)), orbit, run.settings.newton)
+            inside = min(max(ends), max(min(ends), value))
+            point = start_point(curve, inside, orbit, run.settings.newton, run.bounds)
             trace = both_ways(point, run.ahead, run.bounds, run.settings)
     return run.branch(trace)
 
@@ -211,12 +212,22 @@ def _written(harmonics: Harmonics, options: CurveOptions, **more: Any) -> str:
     return "".join(words)
 
 
+#: distance from the first value of a range, as a share of it, up to which a curve begins there
+_AT_END = 1e-6
+
+
 def from_end(curve: MotionProblem, start: Any, run: CurveRun, call: str) -> Trace:
     """The branch from the first value on, with a warning where it leaves its range there: the motions at the other end
     lie on another one, which `call` follows.
     """
     name, first = run.name, run.ends[0]
-    trace = follow(start_point(curve, first, start, run.settings.newton), run.ahead, run.bounds, run.settings)
+    begun = start_point(curve, first, start, run.settings.newton, run.bounds)
+    trace = follow(begun, run.ahead, run.bounds, run.settings)
+    if abs(begun.parameter - first) > _AT_END * abs(run.ends[1] - first):
+        trace.warnings.append(
+            f"the given start leads to no motion at {name} = {first:.6g}: the curve begins at the nearest one, "
+            f"{name} = {begun.parameter:.6g}"
+        )
     orbit = trace.points[-1].orbit
     back = len(trace.points) > 1 and (orbit.omega if name == "omega" else orbit.values[name]) == first
     if back and not trace.closed and not trace.interrupted:

@@ -269,7 +269,7 @@ def _motions(curve: MotionProblem, seeds: Seeds, run: CurveRun, report: Report) 
                 continue
             met.append(start)
             try:
-                point = start_point(curve, float(value), start, run.settings.newton)
+                point = start_point(curve, float(value), start, run.settings.newton, run.bounds)
             except ConvergenceError:
                 continue
             own = point.curve

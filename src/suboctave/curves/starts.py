@@ -134,7 +134,17 @@ def linear_response(curve: MotionProblem, value: float) -> Array:
     return curve.join(apply_blocks(inverse, state.load), value)
 
 
-def start_point(curve: MotionProblem, value: float, given: Any, newton: NewtonOptions) -> CurvePoint:
+#: how far off the value that was asked for a motion may lie, relative to it
+_THERE = 1e-9
+
+
+def start_point(
+    curve: MotionProblem,
+    value: float,
+    given: Any,
+    newton: NewtonOptions,
+    reach: tuple[float, float] | None = None,
+) -> CurvePoint:
     """A solved point of the curve at a value of the free parameter, in a basis that suits it.
 
     Parameters
@@ -142,6 +152,9 @@ def start_point(curve: MotionProblem, value: float, given: Any, newton: NewtonOp
     given
         None, a `PeriodicOrbit`, coefficients (2 H + 1, n), or a state `(x, dx/dt)` of shape (2 n,) from which time
         integration leads to the motion.
+    reach
+        Range in which the nearest motion of the curve may lie, where there is none beside a given one at the value
+        itself, as at a limit point; without it only there.
 
     Raises
     ------
@@ -157,11 +170,21 @@ def start_point(curve: MotionProblem, value: float, given: Any, newton: NewtonOp
         guess = _from_given(curve, value, given)
         try:
             return settled(curve, guess, newton)
-        except ConvergenceError as failure:
+        except ConvergenceError:
             if isinstance(given, PeriodicOrbit):
                 # at a limit point the equations are singular at a fixed parameter: the nearest point of the curve
+                nearest = None
                 with suppress(ConvergenceError):
-                    return settled(curve, guess, newton, null_row)
+                    nearest = settled(curve, guess, newton, null_row)
+                if nearest is not None:
+                    low, high = sorted(reach or (value, value))
+                    slack = _THERE * max(abs(low), abs(high))
+                    if low - slack <= nearest.parameter <= high + slack:
+                        return nearest
+                    failure = ConvergenceError(
+                        f"the nearest one lies at {curve.where(nearest.u)}; begin the range there, or start from "
+                        "another"
+                    )
             raise ConvergenceError(f"no motion found from the given start at {curve.where(guess)}: {failure}") from None
     patient = replace(newton, iterations=max(newton.iterations, 40), damped=True)
     ways: list[tuple[str, Callable[[], tuple[MotionProblem, Array]]]] = []

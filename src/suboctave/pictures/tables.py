@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from suboctave.kinds import KINDS
 from suboctave.pictures import style
 from suboctave.pictures.boundary import is_boundary, kind_of, parameter_of, plane_of
 from suboctave.pictures.strokes import fixed_parameters, number_of, spelt
@@ -100,14 +99,11 @@ def notes_on(dataset: xarray.Dataset) -> list[str]:
     notes = [note for note in str(dataset.attrs.get("warnings", "")).splitlines() if note.strip()]
     if dataset.attrs.get("early"):
         notes.append(f"Ended before its end: {dataset.attrs.get('ended', '')}.")
-    if "multiplier_errors" in dataset and dataset.sizes.get("multiplier"):
-        near = np.abs(np.abs(dataset["multipliers"].to_numpy()) - 1.0) <= dataset["multiplier_errors"].to_numpy()
-        which = "a multiplier"
-        if is_boundary(dataset):  # one of them, or a pair, is on the circle all along
-            near &= ~_critical_multipliers(dataset)
-            which = "a multiplier besides the critical one"
-        open_points = int(np.count_nonzero(near.any(axis=1)))
+    if "multiplier_open" in dataset:
+        near = dataset["multiplier_open"].to_numpy().astype(bool)
+        open_points = int(np.count_nonzero(near.any(axis=-1)))
         if open_points:
+            which = "a multiplier besides the critical one" if is_boundary(dataset) else "a multiplier"
             notes.append(
                 f"Unsettled: at {open_points} of {near.shape[0]} points {which} is closer to the unit circle than "
                 "its estimated error, so that the verdict there could be the other one."
@@ -117,19 +113,6 @@ def notes_on(dataset: xarray.Dataset) -> list[str]:
         what = "bifurcation is" if doubtful == 1 else "bifurcations are"
         notes.append(f"{doubtful} {what} located to a stated uncertainty: see the remarks in the table.")
     return notes
-
-
-def _critical_multipliers(dataset: xarray.Dataset) -> np.ndarray:
-    """Which multipliers are those that make the points bifurcations, (points, multipliers), bool: one at LP, BP and PD,
-    a pair at NS, none at grazings.
-    """
-    mu, row = dataset["multipliers"].to_numpy(), KINDS[kind_of(dataset)]
-    # a pair that becomes real in a resonance is at the circle still
-    distance = np.abs(np.abs(mu) - 1.0) if row.multiplier is None else np.abs(mu - row.multiplier)
-    nearest = np.argsort(np.where(np.isnan(distance), np.inf, distance), axis=1, kind="stable")[:, : row.critical]
-    critical = np.zeros(mu.shape, dtype=bool)
-    np.put_along_axis(critical, nearest, True, axis=1)
-    return critical
 
 
 def origin_of(dataset: xarray.Dataset) -> list[tuple[str, str]]:

@@ -231,6 +231,21 @@ class Branch(CurveTables, BranchReadings):
         """Which multipliers of the motion at a point decide whether it is stable: all, (m,), bool."""
         return np.ones(len(multipliers), dtype=bool)
 
+    def open_at(self, point: BranchPoint) -> NDArray[np.bool_]:
+        """Which multipliers leave the verdict at a point open, (m,), bool: of those that decide the ones within their
+        errors of the unit circle.
+        """
+        floquet = point.floquet
+        return floquet.open & self.deciding(point, floquet.multipliers)
+
+    @cached_property
+    def multiplier_open(self) -> np.ndarray:
+        """Which multipliers leave the verdict open (`open_at`), (len, 2 N), bool."""
+        table = np.zeros(self.multipliers.shape, dtype=bool)
+        for row, point in zip(table, self.points, strict=True):
+            row[: len(point.floquet.multipliers)] = self.open_at(point)
+        return table
+
     @property
     def verdicts(self) -> str:
         """How many motions are unstable, in words, and of how many that cannot be told: without damping."""

@@ -81,6 +81,13 @@ class ModeCurve(TrackedBranch):
             others[np.argsort(distance, kind="stable")[:2]] = False
         return others
 
+    def open_at(self, point: BranchPoint) -> NDArray[np.bool_]:
+        """See `Branch.open_at`. Multipliers of a conservative motion lie on the unit circle or come off it in pairs:
+        one leaves the verdict open if its error is larger than the growth that counts. Of a damped mode none does.
+        """
+        loose = point.floquet.errors > ON_CIRCLE
+        return super().open_at(point) & loose & (not self.damped)
+
     def stable_at(self, point: BranchPoint) -> bool:
         """Of a conservative mode whether no multiplier lies off the unit circle but the two that are +1 by themselves.
         Of a damped one True: its motions are those of no system that stands by itself, their stability is not told.

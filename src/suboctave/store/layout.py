@@ -55,6 +55,7 @@ _POINTS: dict[str, tuple[type, str]] = {
     "residual": (float, "residual of the harmonic balance, relative"),
     "multipliers": (complex, "Floquet multipliers over the response period"),
     "multiplier_errors": (float, "estimated errors of the multipliers"),
+    "multiplier_open": (bool, "multipliers within their errors of the unit circle, of those that decide on stability"),
     "stability_method": (object, "where the multipliers come from"),
 }
 RESERVED = frozenset(
@@ -164,7 +165,8 @@ def branch_dataset(branch: Any) -> xarray.Dataset:
     dataset = curve_dataset(
         branch.omega,
         branch.amplitude,
-        **{name: getattr(branch, name) for name in ("stable", "harmonics", "multipliers", "multiplier_errors")},
+        **{name: getattr(branch, name) for name in ("stable", "harmonics")},
+        **{name: getattr(branch, name) for name in ("multipliers", "multiplier_errors", "multiplier_open")},
         error=branch.truncation,
         residual=[orbit.residual for orbit in branch.orbits],
         stability_method=branch.stability_methods,

@@ -17,7 +17,7 @@ import numpy as np
 
 from suboctave.model.elements.base import Array
 
-__all__ = ["Repeat", "extents", "period_of", "same_cycle"]
+__all__ = ["Repeat", "extents", "floored", "period_of", "same_cycle"]
 
 _SMALLEST_SHARE = 1e-3
 #: largest share of the distance between the points of a cycle by which they may still move
@@ -40,10 +40,14 @@ def extents(peaks: Array, omega: float, mass: Array) -> Array:
     A degree of freedom that hardly moves counts for a thousandth of the largest one, weighted by the roots of the
     masses `mass` (n,).
     """
-    weight = np.sqrt(mass)
-    floor = _SMALLEST_SHARE * np.max(peaks * weight) / weight
-    lengths = np.maximum(np.maximum(peaks, floor), np.finfo(float).tiny)
+    lengths = np.maximum(floored(peaks, mass), np.finfo(float).tiny)
     return np.concatenate([lengths, omega * lengths])
+
+
+def floored(sizes: Array, mass: Array) -> Array:
+    """Sizes (n,) of which none is below a thousandth of the largest, weighted by the roots of the masses (n,)."""
+    weight = np.sqrt(mass)
+    return np.maximum(sizes, _SMALLEST_SHARE * np.max(sizes * weight) / weight)
 
 
 def period_of(points: Array, sizes: Array, tolerance: float) -> Repeat:

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -37,6 +37,7 @@ from suboctave.progress import reporting
 from suboctave.results.branch import TrackedBranch
 from suboctave.store.layout import parameter_column
 from suboctave.store.table import Table
+from suboctave.timedomain.period_recognition import floored
 
 #: steps of the way, shares of it: the first, the smallest
 _FIRST, _SMALLEST = 0.5, 1e-3
@@ -460,7 +461,8 @@ class _Check:
                 self.unsolved.append(nowhere)
                 continue
             known.append((arc, orbit))
-            beside = _DISTURBED * _extent(orbit) * self.draw.uniform(-1.0, 1.0, 2 * n)
+            extent = _spread(_extent(orbit), orbit)
+            beside = _DISTURBED * (extent if extent.any() else self.sizes[0]) * self.draw.uniform(-1.0, 1.0, 2 * n)
             self.starts.append(_Start(omega, value, known, arc, orbit.start() + beside))
         smallest, largest = self.sizes
         for _ in range(states):
@@ -487,7 +489,7 @@ class _Check:
             observe=self.regimes.options.get("observe"), progress=progress,
         )  # fmt: skip
         pass_on(sections.interruption)
-        return {start: sections.attractor(i) for i, start in enumerate(states)}
+        return {start: _rested(sections.attractor(i), start.state) for i, start in enumerate(states)}
 
     def _judged(self, start: _Start, attractor: Attractor) -> Landing:
         """A trajectory with its verdict."""
@@ -516,8 +518,11 @@ def _sizes(regimes: RegimeMap) -> tuple[Array, Array]:
     """
     system, n = regimes.system, regimes.system.n
     arcs = [arc.points for strip in regimes.strips for arc in strip.arcs]
-    sizes = [_extent(points[i].orbit) for points in arcs for i in (0, len(points) // 2, -1)]
-    known = np.array(sizes) if sizes else np.ones((1, 2 * n))
+    orbits = [points[i].orbit for points in arcs for i in (0, len(points) // 2, -1)]
+    known = np.array([_spread(_extent(orbit), orbit) for orbit in orbits]).reshape(-1, 2 * n)
+    known = known[known.any(axis=1)]
+    if not len(known):  # all at rest: nothing tells a size
+        known = np.ones((1, 2 * n))
     top = known.max(axis=0)
     curve = make_curve(system, "omega", regimes.omega[0], regimes.omega[1], 1, 1, None)
     first, last = regimes.omega
@@ -552,6 +557,19 @@ def _extent(orbit: PeriodicOrbit) -> Array:
     """Largest displacement and velocity of every DOF, shape (2n,)."""
     dofs = range(orbit.balance.system.n)
     return np.array([orbit.amplitude(i) for i in dofs] + [orbit.velocity_amplitude(i) for i in dofs])
+
+
+def _rested(reached: Attractor, begun: Array) -> Attractor:
+    """What a trajectory has reached, rest where it has died out: what shrinks for ever never repeats."""
+    if reached.period or not np.abs(reached.points).max() <= _REPEATS * np.abs(begun).max():
+        return reached
+    return replace(reached, kind="periodic", period=1, points=np.zeros_like(reached.points[:1]))
+
+
+def _spread(extent: Array, orbit: PeriodicOrbit) -> Array:
+    """Extents (2n,) of a motion in which a degree of freedom that hardly moves has a share of what the largest has."""
+    mass = np.abs(orbit.balance.system.mass.sparse_value(orbit.values).diagonal())
+    return np.concatenate([floored(half, mass) for half in np.split(extent, 2)])
 
 
 def _own(orbit: PeriodicOrbit) -> float:
