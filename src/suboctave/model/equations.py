@@ -19,6 +19,7 @@ import sympy
 from sympy.simplify.fu import TR8
 
 from suboctave.errors import InputError, located, suggest
+from suboctave.model.angles import declared_angles
 from suboctave.model.elements.base import BaseElement
 from suboctave.model.elements.coupled import Expression
 from suboctave.model.elements.springs import CubicSpring, PolynomialSpring
@@ -53,6 +54,14 @@ def parts_of(equations: str | Sequence[str], parameters: Mapping[str, float]) ->
         raise InputError(f"an equation of {longest} characters is too long (at most {LONGEST})")
     texts = [text.replace("\u2032", "'").replace("\u2019", "'") for text in texts]
     return _Equations(texts, dict(parameters)).parts()
+
+
+def declared_in(equations: str | Sequence[str]) -> tuple[Any, dict[str, str]]:
+    """Equations without the angles that are declared beside them, and these with the sizes of their turns."""
+    texts = [equations] if isinstance(equations, str) else equations
+    if not isinstance(texts, Sequence) or not all(isinstance(text, str) for text in texts):
+        return equations, {}
+    return declared_angles(texts)
 
 
 class _Equations:

@@ -14,6 +14,7 @@ Bampton's coordinates, within the span of the basis.
 from __future__ import annotations
 
 import copy
+import functools
 import operator
 from collections.abc import Sequence
 from typing import Any
@@ -23,6 +24,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 from suboctave.errors import InputError
+from suboctave.model.angles import Turns
 from suboctave.model.elements.base import Array, BaseElement, Place
 from suboctave.model.elements.coupled import CoupledElement
 from suboctave.model.loads import HarmonicLoad
@@ -32,6 +34,8 @@ from suboctave.model.system import System
 _ROUNDING = 1e-10
 #: part of a displacement that is read, relative to the others, that a basis must be able to move by itself
 _DEPENDENT = 1e-9
+#: part of a turn that need not fit into a basis, relative to it
+_TURNED = 1e-9
 #: share of the energy of a state that is worth a word when it does not fit into a basis
 _NOTICED = 1e-9
 
@@ -65,6 +69,21 @@ class ProjectedSystem(System):
     def words(self) -> str:
         """What a result rests on."""
         return projected_words(self.structure.n, self.n, self.covers, self.error)
+
+    @functools.cached_property
+    def turns(self) -> Turns:
+        """Those of the structure in the coordinates; InputError for one that does not fit into the basis."""
+        rows = []
+        for angle in self.structure.angles:
+            turn = angle.turn(self.structure.n)
+            row: Array = np.linalg.lstsq(self.shapes, turn, rcond=None)[0]
+            if np.abs(self.shapes @ row - turn).max() > _TURNED * np.abs(turn).max():
+                raise InputError(
+                    f"a turn of {angle.name(self.structure.dof_names)} is no motion of the projected structure: give "
+                    "linear=harmonic.StructuralMatrices(system), which takes all of its degrees of freedom"
+                )
+            rows.append(row)
+        return Turns(np.array(rows).reshape(-1, self.n))
 
     def coordinate(self, dof: int) -> int:
         """Which coordinate is the displacement of a degree of freedom of the structure."""
@@ -149,7 +168,7 @@ def project(
         object.__setattr__(result, name, value)
     result._fill(
         check=False, **parts, elements=[_seen_element(e, structure.n, seen) for e in structure.elements], loads=loads,
-        parameters=structure.parameters, name=structure.name, dof_names=(), units=structure.units,
+        parameters=structure.parameters, name=structure.name, dof_names=(), units=structure.units, angles=(),
     )  # fmt: skip
     return result
 

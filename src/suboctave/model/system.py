@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from suboctave.errors import InputError, Key, Refusals, is_number, located, printable, shortened, suggest
+from suboctave.model.angles import Angle, Turns, check_angles, numbered, read_angles
 from suboctave.model.description import Arrays, build_part, describe_part, from_plain, plain_value
 from suboctave.model.elements.base import Array, BaseElement
 from suboctave.model.elements.smoothness import CornerSampling, PiecewiseLinear, SharpVelocitySampling
@@ -27,7 +28,7 @@ from suboctave.model.modes import modes_of
 from suboctave.units import UnitSystem
 
 _MATRICES = ("mass", "damping", "stiffness", "structural")
-_PARTS = (*_MATRICES, "elements", "loads", "parameters", "name", "dof_names", "units")
+_PARTS = (*_MATRICES, "elements", "loads", "parameters", "name", "dof_names", "units", "angles")
 
 
 class System:
@@ -42,7 +43,8 @@ class System:
     `structural`: structural damping S, a force `i S x` at every frequency: like the other matrices, `{"eta": K}` for a
     loss factor. `dof_names`: names for messages. Units are the user's own, if they are consistent; frequencies are
     circular. `units`: their names, length, force (or mass) and time, such as `"mm, N, s"`, for axes and tables; nothing
-    is converted.
+    is converted. `angles`: degrees of freedom that mean the same position a whole turn further, by number or name,
+    those that only turn together as a list; a mapping says the size of a turn, `{"x": "pi"}`, default 2 pi.
 
     Raises `InputError` for anything that does not fit, before any work.
     """
@@ -57,6 +59,7 @@ class System:
     name: str
     dof_names: tuple[str, ...]
     units: UnitSystem | None
+    angles: tuple[Angle, ...]
     n: int
     _components: tuple[LoadComponent, ...]
 
@@ -72,8 +75,10 @@ class System:
         dof_names: Iterable[str] = (),
         structural: Any = None,
         units: str | None = None,
+        angles: Any = (),
     ) -> None:
         read = matrix_coefficient(mass, None, "mass")
+        names = _read_dof_names(dof_names, read.n)
         stiff = matrix_coefficient(stiffness, read.n, "stiffness")
         if hasattr(damping, "matrix"):
             damping = _made_of(damping, read, stiff)
@@ -89,8 +94,9 @@ class System:
             loads=_several(loads, Load, "HarmonicLoad", "loads"),
             parameters=_read_parameters(parameters),
             name=printable(str(name)),
-            dof_names=_read_dof_names(dof_names, read.n),
+            dof_names=names,
             units=UnitSystem.of(units),
+            angles=read_angles(angles, read.n, names),
         )
         for i, load in enumerate(self.loads):  # not of known systems, which are read from files
             with located("loads", i):
@@ -104,6 +110,7 @@ class System:
         parameters: Mapping[str, float] | None = None,
         name: str = "",
         units: str | None = None,
+        angles: Any = None,
     ) -> System:
         """A system from equations of motion as text, such as `"x'' + 2*zeta*x' + x + a*x**3 = p*cos(omega*t)"`.
 
@@ -111,14 +118,20 @@ class System:
         constant factors. Linear terms go to mass, damping and stiffness, `cos(k*omega*t + phase)` and `sin` (k an
         integer) to loads, constants to static loads, all others to elements: `Expression`, or `CubicSpring`,
         `PolynomialSpring`, `ElasticStop` where they are such. State times cosine is parametric excitation. Functions:
-        those of coefficients, `sign`, `heaviside`, and `max` and `min` of two arguments.
+        those of coefficients, `sign`, `heaviside`, and `max` and `min` of two arguments. A text "angle x" beside the
+        equations (or behind one and a semicolon), or `angles=["x"]`, declares an angle; "angle x: pi" the size of a
+        turn.
 
         Raises `InputError` with the place in the text.
         """
-        from suboctave.model.equations import parts_of
+        from suboctave.model.equations import declared_in, parts_of
 
         read = _read_parameters(parameters)
-        return cls(**parts_of(equations, read), parameters=read, name=name, units=units)
+        equations, declared = declared_in(equations)
+        if angles is not None and declared:
+            raise InputError("angles are declared in the equations and by angles=: leave one of them out", ("angles",))
+        parts = parts_of(equations, read)
+        return cls(**parts, parameters=read, name=name, units=units, angles=declared if angles is None else angles)
 
     def _fill(self, check: bool, **parts: Any) -> None:
         """Take all parts; `check`: whether they fit each other, where no system has accepted them already."""
@@ -157,6 +170,17 @@ class System:
     def with_units(self, units: str | None) -> System:
         """The same system with names of its units, such as `"mm, N, s"`; its numbers stay as they are."""
         return self._changed(units=UnitSystem.of(units))
+
+    def with_angles(self, angles: Any) -> System:
+        """The same system with these degrees of freedom as angles, as `angles` of `System`; none for an empty list."""
+        result = self._changed(angles=read_angles(angles, self.n, self.dof_names))
+        check_angles(result)
+        return result
+
+    @functools.cached_property
+    def turns(self) -> Turns:
+        """The turns of its angles, by which states are compared."""
+        return Turns(np.array([angle.turn(self.n) for angle in self.angles]).reshape(-1, self.n))
 
     def with_scaled_loads(self, name: str = "load_scale") -> System:
         """The same system whose oscillating loads are multiplied by a new parameter, 1 to begin with.
@@ -247,6 +271,9 @@ class System:
         if first:
             for matrix in (self.damping, self.structural):
                 check_damping(matrix, self.parameters, mass.diagonal())
+        if self.angles and (first or changed):
+            with located("angles"):
+                check_angles(self)
 
     # --------------------------------------------------------------------------------------------------- matrices
     @property
@@ -379,6 +406,8 @@ class System:
         if self.parameters:
             values = ", ".join(f"{name} = {value:g}" for name, value in self.parameters.items())
             lines.append(f"  parameters {values}")
+        if self.angles:
+            lines.append(f"  angles     {', '.join(angle.name(self.dof_names) for angle in self.angles)}")
         if self.units:
             lines.append(f"  units      {self.units}; mass in {self.units.mass}, frequencies in {self.units.frequency}")
         return "\n".join(lines)
@@ -473,6 +502,7 @@ def describe(system: System, arrays: Arrays | None = None) -> dict[str, Any]:
         "loads": [describe_part(load, arrays) for load in system.loads],
         "parameters": dict(system.parameters),
         **({"units": str(system.units)} if system.units else {}),
+        **({"angles": [[list(one.dofs), list(one.periods)] for one in system.angles]} if system.angles else {}),
     }
 
 
@@ -495,6 +525,7 @@ def build(
         parts |= {"parameters": _read_parameters(description["parameters"]), "name": str(description["name"])}
         parts["dof_names"] = _read_dof_names(description["dof_names"], parts["mass"].n)
         parts["units"] = UnitSystem.of(description.get("units"))
+        parts["angles"] = numbered(description.get("angles", ()))
     except InputError:
         raise
     except (KeyError, TypeError, AttributeError, ValueError) as error:

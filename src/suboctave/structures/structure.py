@@ -172,6 +172,7 @@ class Structure:
         name: str = "",
         structural: Any = None,
         units: str | None = None,
+        angles: Any = (),
     ) -> System:
         """The structure with nonlinear elements and loads at its degrees of freedom.
 
@@ -183,7 +184,7 @@ class Structure:
         structure = replace(self, **{what: value for what, value in given.items() if value is not None})
         names = () if self.dofs is None else self.dofs.names
         matrices, losses = structure.matrices(), structure.losses()
-        return System(*matrices, elements, loads, parameters, name or self.name, names, losses, units)
+        return System(*matrices, elements, loads, parameters, name or self.name, names, losses, units, angles)
 
     def matrices(self) -> tuple[Any, Any, Any]:
         """`(M, C, K)` as a `System` takes them; zeros without damping, `{expression: matrix}` where it has parameters.

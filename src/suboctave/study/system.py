@@ -46,6 +46,7 @@ class SystemSection(Section):
     parameters: dict[str, float] = Field(default_factory=dict)
     dof_names: list[str] = Field(default_factory=list)
     units: str | None = None
+    angles: Any = None
 
 
 def published() -> dict[str, Any]:
@@ -58,6 +59,16 @@ def published() -> dict[str, Any]:
 
 def make_system(section: SystemSection, folder: Path, mistakes: Mistakes, allow_code: bool) -> System | None:
     """The system, or None where something is wrong with it."""
+    system = _made(section, folder, mistakes, allow_code)
+    if system is None or section.angles is None:
+        return system
+    with mistakes.at("system"):
+        return system.with_angles(section.angles)
+    return None
+
+
+def _made(section: SystemSection, folder: Path, mistakes: Mistakes, allow_code: bool) -> System | None:
+    """The system without its angles."""
     before = len(mistakes)
     given = {what for what in (*MATRICES, "structure", "equations", "library") if getattr(section, what) is not None}
     ways = [bool(given & set(MATRICES)), "structure" in given, "equations" in given, "library" in given]
