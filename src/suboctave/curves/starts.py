@@ -39,8 +39,9 @@ from suboctave.harmonic.linear_part import LinearPart
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.truncation import AdaptiveHarmonics
 from suboctave.lazy import lazy
+from suboctave.model.angles import Turns
 from suboctave.model.system import System
-from suboctave.timedomain import integrate
+from suboctave.timedomain import Trajectory, integrate
 
 #: harmonics that are expected of a rule that chooses them
 _EXPECTED = 15
@@ -336,8 +337,31 @@ def _integrated(curve: MotionProblem, value: float, state: Array) -> Array:
     samples = 8 * balance.basis.harmonics + 8
     times = np.linspace(0.0, 2.0 * math.pi * balance.basis.nu / omega, samples + 1)
     trajectory = integrate(balance.system.viscous_equivalent(), state, times, omega, values, rtol=1e-6)
+    _check_no_rotation(balance.system, trajectory)
     spectrum = np.fft.rfft(balance.linear.read(trajectory.x[:-1]), axis=0) / samples
     return curve.join(spectrum_to_real(spectrum, balance.basis.harmonics), value)
+
+
+#: what a motion that turns may miss its beginning by after a period, relative to its velocities and to a turn
+_CLOSES = 1e-3
+
+
+def _check_no_rotation(system: System, trajectory: Trajectory) -> None:
+    """Refuse a motion that comes back after a period but for whole turns, of 2 pi where no angle is declared."""
+    turns = system.turns or Turns(2.0 * math.pi * np.eye(system.n))
+    away = trajectory.x[-1] - trajectory.x[0]
+    counts = turns.counts(away)
+    turned = np.flatnonzero(counts)
+    speeds = np.abs(trajectory.v[-1] - trajectory.v[0]) / np.maximum(np.abs(trajectory.v).max(axis=0), 1e-300)
+    finite = np.where(np.isfinite(turns.periods), turns.periods, np.maximum(np.abs(trajectory.x).max(axis=0), 1e-300))
+    if turned.size and max(speeds.max(), (np.abs(turns.modulo(away)) / finite).max()) <= _CLOSES:
+        dof = int(np.argmax(np.abs(counts @ turns.rows)))
+        name = system.dof_names[dof] if system.dof_names else f"x_{dof}"
+        raise ConvergenceError(
+            f"the motion from this state turns: {name} grows by {away[dof]:.6g} in its period. Harmonic balance "
+            "describes motions that come back to where they began; follow what turns in time, with the angle declared "
+            "(angles= of the system): so.brute_force_diagram, so.basins, so.lyapunov_exponents"
+        )
 
 
 class _HeldEvaluation(MotionEvaluation):

@@ -115,13 +115,13 @@ class Catalogue:
     def find(self, points: Array) -> int | None:
         """The number of the one with these stroboscopic points (n, 2n), to a hundred thousandth of its size."""
         for i, one in enumerate(self.known):
-            if same_cycle(one.points, points, self._sizes[i], _SAME):
+            if same_cycle(one.points, points, self._sizes[i], _SAME, self.system.turns):
                 return i
         return None
 
     def near(self, number: int, points: Array) -> bool:
         """Whether these stroboscopic points are those of that one, roughly."""
-        return same_cycle(self.known[number].points, points, self._sizes[number], _ROUGHLY)
+        return same_cycle(self.known[number].points, points, self._sizes[number], _ROUGHLY, self.system.turns)
 
     def add(self, state: Array, period: int, name: str | None, given: bool) -> int | None:
         """Enter the motion near a state, found by shooting: its number, None if there is no stable one."""
@@ -136,7 +136,8 @@ class Catalogue:
         points = np.vstack([solution.state[None], motions.states[0][:-1]])
         sizes = self._extents(points)
         for shorter in range(1, period):
-            if period % shorter == 0 and same_cycle(np.roll(points, shorter, axis=0)[:1], points[:1], sizes, _SAME):
+            other = np.roll(points, shorter, axis=0)[:1]
+            if period % shorter == 0 and same_cycle(other, points[:1], sizes, _SAME, self.system.turns):
                 return self.add(solution.state, shorter, name, given)
         known = self.find(points)
         if known is None:
@@ -160,7 +161,7 @@ class Catalogue:
         out = np.full(len(states), -1)
         for i, one in enumerate(self.known):
             for trap in one.traps:
-                out[(out < 0) & trap.holds(states)] = i
+                out[(out < 0) & trap.holds(states, self.system.turns)] = i
         return out
 
     def _extents(self, points: Array) -> Array:

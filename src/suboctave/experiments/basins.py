@@ -41,7 +41,7 @@ from suboctave.store.plain import Recorded, from_json, padded, to_json
 from suboctave.timedomain.flow import Flow, Motions, check_extent
 from suboctave.timedomain.trapping import Trap
 
-APERIODIC, GONE, OPEN = -1, -2, -3
+APERIODIC, GONE, OPEN, DRIFTING = -1, -2, -3, -4
 #: states followed together; cells of the coarse sample along each side; stopped trajectories that are followed on
 _CHUNK, _COARSE, _FOLLOWED = 4096, 8, 200
 #: periods between two tests of where the trajectories are, early and late
@@ -49,7 +49,7 @@ _EARLY, _LATE, _LONG = 8, 16, 64
 #: periods by which a trajectory that was not trapped is classified
 _CLASSIFIED = 60
 
-_OTHERS = {APERIODIC: "aperiodic", GONE: "left the range", OPEN: "not computed"}
+_OTHERS = {APERIODIC: "aperiodic", GONE: "left the range", OPEN: "not computed", DRIFTING: "drifting"}
 
 
 @dataclass(eq=False, repr=False)
@@ -62,7 +62,8 @@ class Basins(TimeResult):
         (W,) and (V,): the states' coordinates along `plane`, from end to end of the box.
     labels
         (V, W): the number of the attractor in `attractors`; -1 of motions that do not repeat, -2 where the trajectory
-        left the range of numbers, -3 where nothing was computed (an interruption).
+        left the range of numbers, -3 where nothing was computed (an interruption), -4 of motions that drift, as
+        rotations do whose angle is not declared.
     settling
         (V, W): periods of the load after which the trajectory was known to be trapped.
     attractors
@@ -195,9 +196,10 @@ class Basins(TimeResult):
 
     def _in_words(self) -> str:
         shares = ", ".join(f"{name} {share:.4f} +- {self.grid_errors[name]:.1g}" for name, share in self.shares.items())
+        drifts = "\n  what drifts may be a rotation: declare its angle (angles= of the system)"
         return (
             f"Basins({len(self.x)} x {len(self.y)} states at omega={self.omega:.8g}: {shares}"
-            f"{'' if self.complete else ', not complete'})"
+            f"{'' if self.complete else ', not complete'}){drifts if (self.labels == DRIFTING).any() else ''}"
         )
 
 
@@ -468,13 +470,18 @@ class BasinRun:
         c = self.catalogue
         motions = self._over(states, _CLASSIFIED, _CLASSIFIED, measure=True)
         parameters = {**c.system.parameters, **c.values}
-        for i, points, peaks, failed in zip(which, motions.states, motions.peaks, motions.failed, strict=True):
+        turns = motions.turns if c.system.turns else None
+        rows = zip(which, motions.states, motions.peaks, motions.failed, strict=True)
+        for k, (i, points, peaks, failed) in enumerate(rows):
             if failed:
                 labels[i] = GONE
                 continue
-            end = attractor_of(c.system, points, peaks, c.omega, parameters, c.how.period_tolerance, c.how.observe)
+            turned = None if turns is None else turns[k]
+            end = attractor_of(
+                c.system, points, peaks, c.omega, parameters, c.how.period_tolerance, c.how.observe, turned
+            )
             if not end.period:
-                labels[i] = APERIODIC
+                labels[i] = APERIODIC if end.drift is None else DRIFTING
                 continue
             number = c.find(end.points)
             if number is None:

@@ -55,11 +55,14 @@ class BruteForceDiagram(TimeResult):
     starts
         S of "up", "down", "rest", "state 0", "state 1", ...
     points
-        (S, V, P, 2n): states at phase 0 of the load after the transient; NaN where nothing was computed.
+        (S, V, P, 2n): states at phase 0 of the load after the transient, angles within half a turn; NaN where nothing
+        was computed.
     largest
         (S, V, P, n): the largest |x_i| in the period before each point.
     complete
         False where an interruption (Ctrl-C) left values out.
+    turns
+        (S, V, P, k): whole turns that each of k angles had made by then; None without angles.
 
     The table has one row per value and start: what was varied, start, period, amplitude, defect of the repetition.
     """
@@ -78,20 +81,23 @@ class BruteForceDiagram(TimeResult):
     method: str
     observed: int
     system: System
+    turns: Annotated[NDArray[np.int_] | None, On("start", "value", "section", "angle")] = None
 
     @cached_property
     def attractors(self) -> list[list[Attractor | None]]:
         """S lists of V attractors, None where the trajectory left the range of numbers or was not computed."""
-        rows = zip(coordinates_of(self.points), coordinates_of(self.largest), strict=True)
+        points, largest = coordinates_of(self.points), coordinates_of(self.largest)
+        turned = np.zeros((*points.shape[:3], 0), dtype=int) if self.turns is None else self.turns
+        rows = zip(points, largest, turned, strict=True)
         return [[self._attractor(*one) for one in zip(self.values, *row, strict=True)] for row in rows]
 
-    def _attractor(self, value: float, points: Array, largest: Array) -> Attractor | None:
+    def _attractor(self, value: float, points: Array, largest: Array, turned: NDArray[np.int_]) -> Attractor | None:
         if not np.isfinite(points).all():
             return None
         at = {**self.system.parameters, **({} if self.omega is None else {self.name: float(value)})}
         omega = float(value) if self.omega is None else self.omega
         observed = observed_in(self.projection, self.observed)
-        one = attractor_of(self.integrated, points, largest, omega, at, self.tolerance, observed)
+        one = attractor_of(self.integrated, points, largest, omega, at, self.tolerance, observed, turned)
         return recovered_attractor(one, self.projection)
 
     @property
@@ -133,13 +139,16 @@ class BruteForceDiagram(TimeResult):
         return super().plot(path, curves=curves, **options)
 
     def _in_words(self) -> str:
-        counts = []
-        for period in sorted({int(p) for p in self.period.ravel() if p >= 0}, key=lambda p: (p == 0, p)):
-            name = "aperiodic" if period == 0 else "T" if period == 1 else f"{period}T"
-            counts.append(f"{name} {int((self.period == period).sum())}")
+        known = [one for row in self.attractors for one in row if one is not None]
+        periodic = sorted({one.period for one in known if one.period})
+        names = [("T" if p == 1 else f"{p}T", sum(one.period == p for one in known)) for p in periodic]
+        names += [(kind, sum(one.kind == kind for one in known)) for kind in ("drifting", "aperiodic")]
+        counts = [f"{name} {count}" for name, count in names if count]
+        drifting = next((f"\n  {one.drifts}" for one in known if one.drifts), "")
+        whole = "" if self.complete else ", not complete"
         return (
             f"BruteForceDiagram({self.name} from {self.values[0]:g} to {self.values[-1]:g}, {len(self.values)} values, "
-            f"{' and '.join(self.starts)}: {', '.join(counts) or 'nothing'}{'' if self.complete else ', not complete'})"
+            f"{' and '.join(self.starts)}: {', '.join(counts) or 'nothing'}{whole}){drifting}"
         )
 
 
@@ -190,7 +199,7 @@ def brute_force_diagram(
     points, largest = (np.full((len(labels), len(grid), periods, size), np.nan) for size in (2 * system.n, system.n))
     diagram = BruteForceDiagram(
         name, grid, labels, points, largest, True, None if name == "omega" else at, transient, how.period_tolerance,
-        how.method, how.observe, system,
+        how.method, how.observe, system, turns=_no_turns(system, points),
     )  # fmt: skip
     run = _Run(diagram, periods, how)
     with reporting(options.get("progress"), "brute force") as report:
@@ -231,6 +240,8 @@ class _Run:
             columns = [step if d.starts[row] == "up" else count - 1 - step for row in rows]
             motions = self._over(flow, states, d.values[columns], workers=1).whole()
             d.points[rows, columns], d.largest[rows, columns] = motions.states, motions.peaks
+            if d.turns is not None:
+                d.turns[rows, columns] = motions.turns
             # where a motion has left the range of numbers, the next value begins as the first one did
             states = np.where(motions.failed[:, None], first, motions.end)
             if report is not None:
@@ -243,6 +254,8 @@ class _Run:
         motions = self._over(self._flow(), states, values, workers=self.how.workers, report=report)
         for out, kept in ((d.points, motions.states), (d.largest, motions.peaks)):
             out[rows] = kept.reshape(k, count, *kept.shape[1:])
+        if d.turns is not None:
+            d.turns[rows] = motions.turns.reshape(k, count, *motions.turns.shape[1:])
         return motions.interruption
 
     def _flow(self, lanes: int | None = None) -> Flow:
@@ -253,6 +266,11 @@ class _Run:
         d = self.diagram
         omega, varied = (values, {}) if d.omega is None else (d.omega, {d.name: values})
         return flow.over(states, omega, d.transient + self.periods, varied, d.transient, measure=True, **options)
+
+
+def _no_turns(system: System, points: Array) -> NDArray[np.int_] | None:
+    """Room for whole turns at points (S, V, P, 2n); None without angles."""
+    return np.zeros((*points.shape[:3], len(system.turns.rows)), dtype=int) if system.turns else None
 
 
 def _share(report: Report | None, begin: float, end: float) -> Report | None:

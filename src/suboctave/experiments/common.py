@@ -510,12 +510,14 @@ class TimeResult(Stored, Pictured):
         own: dict[str, Any] = {}
         for field, _, place in _entries(type(self)):
             value = getattr(self, field)
+            if value is None:
+                continue
             if isinstance(place, StatesOn):
                 parts = dict(zip(("displacement", "velocity"), halves(value, n), strict=True))
                 arrays |= {name: ((*place.axes, "dof"), part) for name, part in parts.items()}
             elif place.axes:
                 arrays[place.name or field] = place.axes, value
-            elif value is not None:
+            else:
                 own[place.name or field] = int(value) if isinstance(value, bool) else value
         arrays["parameters"] = ("parameter",), np.array(list(values.values()), dtype=float)
         for name, value in self._derived().items():
@@ -574,6 +576,8 @@ def _read(made: Any, groups: Datasets, allow_code: bool, linear: Any) -> TimeRes
         name = place.name or field
         if isinstance(place, StatesOn):
             given[field] = np.concatenate([stored["displacement"], stored["velocity"]], axis=-1)
+        elif place.axes and name not in stored.dataset:
+            continue  # one that has a default, which most results do without
         elif place.axes:
             given[field] = stored[name] if stored[name].dtype.kind not in "OU" else tuple(map(str, stored[name]))
         elif kind == float | None:

@@ -472,9 +472,9 @@ def separate(
         motions = flow.over(starts, omega, how.periods, values, workers=workers).whole()
         if motions.failed.any():
             motions.checked()
-        states = np.concatenate([starts[:, None], motions.states], axis=1) * metric
-        size = float(np.max(np.linalg.norm(states[0], axis=1)))
-        distances.append(np.linalg.norm(states[1:] - states[0], axis=2))
+        states = np.concatenate([starts[:, None], motions.states], axis=1)
+        size = float(np.max(np.linalg.norm(system.turns.modulo(states[0]) * metric, axis=1)))
+        distances.append(np.linalg.norm(system.turns.modulo(states[1:] - states[0]) * metric, axis=2))
         rates += [_slope(time, distance, how.saturation * size) for distance in distances[-1]]
         if report is not None:
             report((i + 1) / len(settings), f"{i + 1} of {len(settings)} settings")

@@ -29,7 +29,7 @@ from suboctave.progress import reporting
 from suboctave.store.layout import parameter_column
 from suboctave.store.plain import Recorded
 from suboctave.timedomain.flow import Flow
-from suboctave.timedomain.period_recognition import extents, period_of, same_cycle
+from suboctave.timedomain.period_recognition import Drift, drift_of, extents, period_of, same_cycle
 
 
 @dataclass(eq=False, repr=False)
@@ -39,7 +39,8 @@ class PoincareSections(TimeResult):
     Attributes
     ----------
     points
-        (B, P, 2n): displacements, then velocities, at phase 0 of the load, after the transient.
+        (B, P, 2n): displacements, then velocities, at phase 0 of the load, after the transient; angles within half a
+        turn.
     largest
         (B, P, n): the largest |x_i| in the period before each point.
     omega
@@ -53,6 +54,8 @@ class PoincareSections(TimeResult):
         (B,): False for those that an interruption left out; their points are NaN.
     tolerance
         Relative tolerance of the recognition of periods.
+    turns
+        (B, P, k): whole turns that each of k angles had made by then; None without angles.
 
     The table has one row per point. `plot` draws the points in the plane of displacement and velocity; options are
     those of `pictures.plot_sections`: `dof`, `title`, `size`.
@@ -71,6 +74,7 @@ class PoincareSections(TimeResult):
     method: str
     observed: int
     system: System
+    turns: Annotated[NDArray[np.int_] | None, On("trajectory", "section", "angle")] = None
 
     def __len__(self) -> int:
         return len(self.points)
@@ -93,6 +97,7 @@ class PoincareSections(TimeResult):
             {**system.parameters, **values},
             self.tolerance,
             observed_in(self.projection, self.observed),
+            None if self.turns is None else self.turns[index],
         )
 
     @property
@@ -146,7 +151,10 @@ class PoincareSections(TimeResult):
 
     def _in_words(self) -> str:
         count, sections, _ = self.points.shape
-        return f"PoincareSections({count} trajectories, {sections} points each after {self.transient} periods)"
+        head = f"PoincareSections({count} trajectories, {sections} points each after {self.transient} periods)"
+        settled = (self.attractor(i) for i in range(min(count, _LOOKED_AT)))
+        drifting = next((one.drifts for one in settled if one.drifts), "")
+        return f"{head}\n  {drifting}" if drifting else head
 
 
 @with_options(SectionOptions)
@@ -198,6 +206,7 @@ def poincare_sections(
         method=how.method,
         observed=how.observe,
         system=system,
+        turns=motions.turns if system.turns else None,
     )
     sections.interruption = motions.interruption
     return sections
@@ -205,6 +214,10 @@ def poincare_sections(
 
 #: by how much more the points of two trajectories on one attractor may miss each other than those of one motion
 _WIDER = 100.0
+#: by how much a drift may miss whole turns of 2 pi, relative to it, and be taken for a rotation
+_WHOLE = 1e-5
+#: trajectories among which a description looks for one that drifts
+_LOOKED_AT = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,11 +227,14 @@ class Attractor:
     Attributes
     ----------
     kind
-        "periodic", or "aperiodic": quasi-periodic, chaotic, of a longer period than is recognised, or not settled yet.
+        "periodic"; "drifting", where it repeats but for displacements that grow by the same each time, as an angle that
+        is not declared does in a rotation; or "aperiodic": quasi-periodic, chaotic, of a longer period than is
+        recognised, or not settled yet.
     period
-        In periods of the load; 0 of an aperiodic motion.
+        In periods of the load; 0 of an aperiodic or drifting motion.
     points
-        (period, 2n): its states at phase 0 of the load; of an aperiodic motion all that were kept.
+        (period, 2n): its states at phase 0 of the load, angles within half a turn; of a motion that is not periodic all
+        that were kept.
     amplitude
         Largest |x| of the observed degree of freedom.
     largest
@@ -229,6 +245,11 @@ class Attractor:
         Of the load, and all of the system's by name.
     count
         How many trajectories have settled on it.
+    turns
+        Whole turns that each of the system's angles makes in its period; empty without angles.
+    drift
+        Of a drifting motion the periods of the load after which it repeats, and by how much its displacements (n,) have
+        grown by then; else None.
     """
 
     kind: str
@@ -241,6 +262,9 @@ class Attractor:
     parameters: Mapping[str, float]
     observed: int
     count: int = 1
+    turns: tuple[int, ...] = ()
+    drift: Drift | None = None
+    names: tuple[str, ...] = ()
 
     @property
     def state(self) -> Array:
@@ -248,9 +272,30 @@ class Attractor:
         return self.points[0]
 
     def __repr__(self) -> str:
-        what = f"{self.period}T" if self.period > 1 else "T" if self.period else "aperiodic"
+        what = f"{self.period}T" if self.period > 1 else "T" if self.period else self.kind
+        if any(self.turns):
+            what += f" rotating by {' and '.join(map(str, self.turns))} turn{'s' * (self.turns not in ((1,), (-1,)))}"
         times = f", {self.count} trajectories" if self.count > 1 else ""
-        return f"Attractor({what} at omega={self.omega:.8g}, max|x_{self.observed}|={self.amplitude:.8g}{times})"
+        size = f"max|x_{self.observed}|={self.amplitude:.8g}"
+        return f"Attractor({what} at omega={self.omega:.8g}, {self.drifts or size}{times})"
+
+    @property
+    def drifts(self) -> str:
+        """How a drifting motion does, and what to declare if that is a rotation; empty of others."""
+        if self.drift is None:
+            return ""
+        step, periods = np.asarray(self.drift.step), self.drift.period
+        dof = int(np.argmax(np.abs(step)))
+        name, grown = self.names[dof] if self.names else f"x_{dof}", float(step[dof])
+        turns = round(grown / (2.0 * np.pi))
+        if not turns or abs(grown / (2.0 * np.pi) - turns) > _WHOLE * abs(turns):
+            each = "each period" if periods == 1 else f"{periods} periods"
+            return f"{name} moves on by {grown:.6g} in {each}: if it is an angle, declare it (angles= of the system)"
+        if turns % periods == 0:
+            turns, periods = turns // periods, 1
+        each = "each period" if periods == 1 else f"{periods} periods"
+        many = {1: "2 pi", -1: "-2 pi"}.get(turns, f"{turns} times 2 pi")
+        return f"{name} turns by {many} in {each}: declare angles=[{(self.names[dof] if self.names else dof)!r}]"
 
 
 def attractor_of(
@@ -261,14 +306,26 @@ def attractor_of(
     parameters: Mapping[str, float],
     tolerance: float,
     observe: int,
+    turned: NDArray[np.int_] | None = None,
 ) -> Attractor:
-    """The attractor of one trajectory from its points (P, 2n) and its largest displacements (P, n) in between."""
+    """The attractor of one trajectory from its points (P, 2n) and its largest displacements (P, n) in between.
+
+    `turned` (P, k): whole turns that are left out of the points.
+    """
+    turns = system.turns
+    whole = points if turned is None or not turns else points.copy()
+    if turned is not None and turns:
+        whole[:, : system.n] += turned @ turns.rows
     sizes = state_sizes(system, peaks, omega, parameters)
-    repeat = period_of(points, sizes, tolerance)
+    repeat, drift, made = period_of(points, sizes, tolerance, turns), None, (0,) * len(turns.rows)
+    if not repeat.period:
+        drift = drift_of(whole, omega, _masses(system, parameters), tolerance)
+    elif turns:
+        made = tuple(turns.counts(whole[-1] - whole[-1 - repeat.period]).tolist())
     last = repeat.period or len(points)
-    largest = peaks[-last:].max(axis=0)
+    points, largest = turns.modulo(points), peaks[-last:].max(axis=0)
     return Attractor(
-        "periodic" if repeat.period else "aperiodic",
+        "periodic" if repeat.period else "aperiodic" if drift is None else "drifting",
         repeat.period,
         points[-last:].copy(),
         float(largest[observe]),
@@ -277,6 +334,9 @@ def attractor_of(
         omega,
         dict(parameters),
         observe,
+        turns=made,
+        drift=drift,
+        names=system.dof_names,
     )
 
 
@@ -291,7 +351,9 @@ def recovered_attractor(one: Attractor, projection: ProjectedSystem | None) -> A
         return one
     points: Any = projection.recovered(one.points)
     largest: Any = projection.recovered_peaks(one.largest)
-    return replace(one, points=points, largest=largest, observed=projection.watched[one.observed])
+    observed, names = projection.watched[one.observed], projection.structure.dof_names
+    drift = one.drift and Drift(one.drift.period, np.asarray(projection.recovered(one.drift.step)))
+    return replace(one, points=points, largest=largest, observed=observed, drift=drift, names=names)
 
 
 def distinct(system: System, all_of: Sequence[Attractor], tolerance: float) -> list[Attractor]:
@@ -304,8 +366,8 @@ def distinct(system: System, all_of: Sequence[Attractor], tolerance: float) -> l
         sizes = state_sizes(system, one.largest[None], one.omega, one.parameters)
         for group in groups:
             other = group[0]
-            if other.period == one.period and (
-                not one.period or same_cycle(other.points, one.points, sizes, _WIDER * tolerance)
+            if (other.period, other.kind, other.turns) == (one.period, one.kind, one.turns) and (
+                not one.period or same_cycle(other.points, one.points, sizes, _WIDER * tolerance, system.turns)
             ):
                 group.append(one)
                 break
@@ -317,6 +379,11 @@ def distinct(system: System, all_of: Sequence[Attractor], tolerance: float) -> l
 
 def state_sizes(system: System, peaks: Array, omega: float, parameters: Mapping[str, Any]) -> Array:
     """Sizes (2n,) of a motion's displacements and velocities, from its largest displacements (P, n) in each period."""
-    mass = np.diagonal(system.mass.value({**system.parameters, **parameters}))
     with np.errstate(invalid="ignore"):
-        return extents(peaks.max(axis=0), omega, mass)
+        return extents(peaks.max(axis=0), omega, _masses(system, parameters))
+
+
+def _masses(system: System, parameters: Mapping[str, Any]) -> Array:
+    """Masses that the degrees of freedom show, (n,)."""
+    mass: Array = np.diagonal(system.mass.value({**system.parameters, **parameters}))
+    return mass

@@ -194,7 +194,10 @@ class _Test:
                     self.how.period_tolerance, self.how.observe,
                 )  # fmt: skip
                 out.period[s, v], out.largest[s, v], out.ends[s, v] = settled.period, largest.max(axis=0), states[s]
-                samples = x[:, :n] + (self.random.normal(0.0, self.noise, (len(x), n)) if self.noise else 0.0)
+                # what turns is measured without its drift
+                rate = np.array(settled.turns) @ self.system.turns.rows / max(settled.period, 1) / _SAMPLES
+                steady = x[:, :n] - np.multiply.outer(np.arange(1.0, len(x) + 1.0), rate)
+                samples = steady + (self.random.normal(0.0, self.noise, (len(x), n)) if self.noise else 0.0)
                 out.components[s, v], out.response[s, v] = self._measured(samples, float(w[s]))
             if report is not None:
                 report((step + 1) / count, f"omega = {w[0]:.6g}")

@@ -123,7 +123,8 @@ def integrate(
     omega
         Circular frequency of the load.
     periods, transient
-        Periods of the load that are given, after some that are left out.
+        Periods of the load that are given, after some that are left out. Angles begin within half a turn; from there on
+        displacements go on through turns.
     steps_per_period
         Instants in one period at which the motion is given (default 200); of Newmark's method its steps (default 1000).
     parameters
@@ -145,9 +146,12 @@ def integrate(
     periods = check_count("periods", periods)
     samples = steps_of(method, steps_per_period)
     start = start_state(system, state)
-    flow = Flow(system, method, samples, samples, tolerance, lanes=FEW)
+    flow = Flow(system, method, samples, samples, tolerance, lanes=FEW, folded=False)
     transient = check_count("transient", transient, 0)
     values, omega = system.read_values(parameters), check_omega(omega)
+    if system.turns:
+        start = _within_a_turn(system, start, omega, transient, values, method, samples, tolerance)
+        transient = 0
     with reporting(options.get("progress"), "integrating") as report:
         motions = flow.over(
             start, omega, periods + transient, values, skip=max(transient * samples - 1, 0), measure=True, report=report
@@ -169,3 +173,14 @@ def integrate(
         method=method,
         system=system,
     )
+
+
+def _within_a_turn(
+    system: System, state: Array, omega: float, transient: int, values: Mapping[str, float], method: str, steps: int,
+    tolerance: float | None,
+) -> Array:  # fmt: skip
+    """The state (2n,) after a transient, angles within half a turn."""
+    if not transient:
+        return system.turns.modulo(state)
+    flow = Flow(system, method, 1, steps, tolerance, lanes=FEW)
+    return np.asarray(flow.over(state, omega, transient, values, skip=transient).checked().end[0])

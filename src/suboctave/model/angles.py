@@ -121,10 +121,12 @@ def _period(given: Any) -> float:
     value = given if text is None else text.value({})
     if isinstance(value, bool) or not is_number(value) or not math.isfinite(value) or value == 0.0:
         raise InputError(f"angles: the size of a turn is a number other than zero, not {shortened(given)}", ("angles",))
-    return abs(float(value)) if text is not None or value > 0 else float(value)
+    return float(value)
 
 
-_DECLARED = re.compile(r"(?:^|[;\n])\s*angles?\s+([^\W\d]\w*(?:\s*:[^;,\n]+)?(?:\s*,\s*[^\W\d]\w*(?:\s*:[^;,\n]+)?)*)\s*(?=$|[;\n])")
+_DECLARED = re.compile(
+    r"(?:^|[;\n])\s*angles?\s+([^\W\d]\w*(?:\s*:[^;,\n]+)?(?:\s*,\s*[^\W\d]\w*(?:\s*:[^;,\n]+)?)*)\s*(?=$|[;\n])"
+)
 
 
 def declared_angles(texts: Sequence[str]) -> tuple[list[str], dict[str, str]]:

@@ -23,7 +23,7 @@ from suboctave.timedomain.adaptive_control import SCALARS, VECTORS
 from suboctave.timedomain.batch import ROOM, Group, Method
 from suboctave.timedomain.generated import Index, Rows, module_of
 from suboctave.timedomain.law_code import LawCode, callback_shapes
-from suboctave.timedomain.layout import Layout, Numbers
+from suboctave.timedomain.layout import NO_TURN, Layout, Numbers
 
 __all__ = ["AdaptiveMethod"]
 
@@ -59,7 +59,7 @@ def adaptive_rows(layout: Layout, lanes: int, count: int) -> Rows:
         "A": (n, n), "B": (n, n), "L": (n, waves), "E": (n, k), "c": layout.law_numbers,
         "y": 2 * n, "trial": (2, n), "K": (13, 2, n), "e3": 2 * n, "e5": 2 * n, "rate": (2, n), "F": k, "wave": waves,
         **dict.fromkeys(("on", "g", "dg", "g1", "dg1"), corners),
-        **dict.fromkeys(("now", "past", "floor", "peak", "crest", "weight"), n),
+        **dict.fromkeys(("now", "past", "floor", "peak", "crest", "weight", "turn", "fold"), n),
         **callback_shapes(layout.called_back),
         "w": (count, 2 * n), "goal": (count, 2, n), "W": (12, count, 2, n), "metric": 2 * n, "log": count,
     }  # fmt: skip
@@ -122,6 +122,8 @@ class AdaptiveMethod(Method):
         # modes of a projection matter by what they add to the motion of the structure
         share = 1.0 if isinstance(self.layout.system, ProjectedSystem) else 1e-3
         rows("floor")[:] = np.maximum(share * np.max(sizes * weight, axis=0) / weight, 1e-300)
+        turns = self.layout.turns[:, None]
+        rows("turn")[:], rows("fold")[:] = turns, turns if batch.folded else NO_TURN
         rows("h")[:] = rows("next")[:] = np.minimum(_FIRST_STEP, 1.0 / self.samples) * period
         rows("left")[:, :alive] = batch.total
         rows("h")[:, alive:] = 0.0

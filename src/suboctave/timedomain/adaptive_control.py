@@ -43,11 +43,11 @@ SCALARS = (
 #: names of several rows, in the order of the array that says where they begin
 VECTORS = (
     "y", "trial", "K", "e3", "e5", "on", "g", "dg", "g1", "dg1", "now", "past", "floor", "peak", "weight", "crest",
-    "w", "goal", "metric", "log",
+    "w", "goal", "metric", "log", "turn", "fold",
 )  # fmt: skip
 (
     _Y, _TRIAL, _K, _E3, _E5, _ON, _G, _DG, _G1, _DG1, _NOW, _PAST, _FLOOR, _PEAK, _WEIGHT, _CREST,
-    _W, _GOAL, _METRIC, _LOG,
+    _W, _GOAL, _METRIC, _LOG, _TURNED, _FOLD,
 ) = range(len(VECTORS))  # fmt: skip
 _SHRINK, _GROW, _SAFETY = 0.3, 6.0, 0.9
 #: a corner is reached when it is this share of a period away, or after so many trials
@@ -99,6 +99,12 @@ def _first_root(m0, d0, m1, d1):
 
 
 @kernel(error_model="numpy")
+def _folded(x, turn):
+    """|x| of an angle taken within half a turn; of what is no angle, the turn of which is beyond all numbers, |x|."""
+    return abs(x - turn * math.floor(x / turn + 0.5))
+
+
+@kernel(error_model="numpy")
 def _turn(c, at, n, i, h):
     """Where velocity i changes sign in the step tried, as a share of it, and |displacement| there, by a quintic."""
     y, k, trial = at[_Y] + i, at[_K] + n + i, at[_TRIAL] + i
@@ -117,7 +123,8 @@ def _turn(c, at, n, i, h):
             low = x
         else:
             top = x
-    return low, abs(((((c5 * low + c4) * low + c3) * low + c2) * low + h * v0) * low + x0)
+    top = ((((c5 * low + c4) * low + c3) * low + c2) * low + h * v0) * low + x0
+    return low, _folded(top, c[at[_FOLD] + i])
 
 
 @kernel(error_model="numpy")
@@ -183,11 +190,14 @@ def _accept(c, l, at, n, corners, samples, skip, h, landed, out, peaks, measure)
     for i in range(n):
         x1, v1 = c[at[_TRIAL] + i], c[at[_TRIAL] + n + i]
         if measure:
-            top = abs(x1)
+            fold = c[at[_FOLD] + i]
+            top = _folded(x1, fold)
+            if math.floor(c[at[_Y] + i] / fold + 0.5) != math.floor(x1 / fold + 0.5):
+                top = 0.5 * fold  # past the far side of the turn
             if c[at[_Y] + n + i] * v1 < 0.0:
                 top = max(top, _turn(c, at, n, i, h)[1])
             c[at[_PEAK] + i] = max(c[at[_PEAK] + i], top)
-        c[at[_NOW] + i] = max(c[at[_NOW] + i], abs(x1), abs(v1) / c[_OMEGA])
+        c[at[_NOW] + i] = max(c[at[_NOW] + i], _folded(x1, c[at[_TURNED] + i]), abs(v1) / c[_OMEGA])
     for i in range(2 * n):
         c[at[_Y] + i] = c[at[_TRIAL] + i]
         c[at[_K] + i] = c[at[_K] + 24 * n + i]
@@ -262,8 +272,9 @@ def control(z, l, at, n, corners, samples, skip, tolerance, out, peaks, measure)
         dof = i if i < n else i - n
         size = max(c[at[_NOW] + dof], c[at[_PAST] + dof], c[at[_FLOOR] + dof])
         if i >= n:
-            size *= c[_OMEGA]
-        size = max(size, abs(c[at[_TRIAL] + i]))
+            size = max(size * c[_OMEGA], abs(c[at[_TRIAL] + i]))
+        else:
+            size = max(size, _folded(c[at[_TRIAL] + i], c[at[_TURNED] + i]))
         e3 += (c[at[_E3] + i] / size) ** 2
         e5 += (c[at[_E5] + i] / size) ** 2
     error = 0.0 if e3 == 0.0 and e5 == 0.0 else abs(h) * e5 / math.sqrt((e5 + 0.01 * e3) * 2 * n)

@@ -33,6 +33,8 @@ class Batch:
         Whether the largest displacements are wanted.
     first
         At which sample of the period each begins, (B,); 0 for all without it.
+    folded
+        Whether the largest displacements of angles are taken within half a turn.
     address
         Where the code finds the laws that are called back.
     """
@@ -46,6 +48,7 @@ class Batch:
     measure: bool
     first: Array | None
     address: int
+    folded: bool = True
 
     @property
     def kept(self) -> int:

@@ -13,7 +13,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from time import perf_counter
 
 import numpy as np
@@ -68,6 +68,9 @@ class Motions:
         (B, 2n, k): the tangent vectors at the end, as columns.
     interruption
         What stopped them, Ctrl-C or a time limit; None if nothing did.
+    turns
+        (B, S, k): of a flow that keeps states at phase 0 alone, whose angles are taken within half a turn, the whole
+        turns that each of k angles had made by then; S = 0 of others.
     """
 
     states: Array
@@ -79,6 +82,7 @@ class Motions:
     growth: Array
     tangents: Array
     interruption: Interruption | None = None
+    turns: NDArray[np.int_] = field(default_factory=lambda: np.zeros((0, 0, 0), dtype=int))
 
     def whole(self) -> Motions:
         """These, if nothing stopped them; else what did so is raised again."""
@@ -124,6 +128,9 @@ class Flow:
         orthonormal, with weights `omega sqrt(M_ii)` of displacements and `sqrt(M_ii)` of velocities.
     transition
         Leave them as they come, from unit vectors: with 2n of them, the state-transition matrix.
+    folded
+        Whether whole turns of angles are left out: of the largest displacements, of the last states and, with one
+        sample per period, of all states; with more of them states go on through turns.
     """
 
     def __init__(
@@ -136,6 +143,7 @@ class Flow:
         lanes: int | None = None,
         tangents: int = 0,
         transition: bool = False,
+        folded: bool = True,
     ) -> None:
         if method not in METHODS:
             raise InputError(f"method={method!r}{suggest(str(method), METHODS)}")
@@ -147,7 +155,7 @@ class Flow:
         steps = check_count("steps_per_period", steps_per_period)
         if method == "newmark" and (steps < 4 or steps % samples):
             raise InputError(f"steps_per_period={steps} must be at least 4 and a multiple of samples={samples}")
-        self.system, self.method, self.samples = system, method, samples
+        self.system, self.method, self.samples, self.folded = system, method, samples, folded
         self.layout = Layout(system)
         self.integrator: Method
         if tangents and (method != "accurate" or not 0 < tangents <= 2 * system.n):
@@ -208,8 +216,19 @@ class Flow:
         rows = {name: value.reshape(len(w), -1) for name, value in self.integrator.numbers(numbers).items()}
         sizes, callbacks = self.layout.sizes(numbers, x, which), PythonCallbacks(self.layout.called_back)
         at = None if first is None else np.broadcast_to(np.asarray(first) % self.samples, (count,)).astype(float)
-        batch = Batch(rows, which, x, sizes, total, skip, measure, at, callbacks.address)
-        return _Run(self.integrator, batch, callbacks).go(workers, report)
+        batch = Batch(rows, which, x, sizes, total, skip, measure, at, callbacks.address, self.folded)
+        motions = _Run(self.integrator, batch, callbacks).go(workers, report)
+        return self._without_turns(motions) if self.folded and first is None else motions
+
+    def _without_turns(self, motions: Motions) -> Motions:
+        """Motions with angles within half a turn, as far as their states are compared."""
+        turns = self.system.turns
+        if not turns:
+            return motions
+        motions = replace(motions, end=turns.modulo(motions.end))
+        if self.samples > 1:
+            return motions
+        return replace(motions, states=turns.modulo(motions.states), turns=turns.counts(motions.states))
 
     def onward(
         self,

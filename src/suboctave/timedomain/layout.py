@@ -20,7 +20,11 @@ from suboctave.model.elements.batch_form import BatchForm
 from suboctave.model.expressions.coefficients import Coefficient
 from suboctave.model.system import System
 
-__all__ = ["Layout", "Numbers", "PlacedLaw"]
+__all__ = ["NO_TURN", "Layout", "Numbers", "PlacedLaw"]
+
+
+#: size of a turn of a displacement that is no angle: beyond all that occur
+NO_TURN = 1e300
 
 
 @dataclass(frozen=True)
@@ -59,6 +63,8 @@ class Layout:
     def __init__(self, system: System) -> None:
         self.system = system
         self.n = n = system.n
+        #: size of a turn of each degree of freedom, (n,)
+        self.turns: Array = np.minimum(system.turns.periods, NO_TURN)
         channels: dict[bytes, int] = {}
         outputs: dict[bytes, int] = {}
         self.laws: list[PlacedLaw] = []
@@ -150,7 +156,8 @@ class Layout:
         diagonal = diagonal + omega[:, None] * np.abs(np.diagonal(numbers.damping, axis1=1, axis2=2))
         mass = np.abs(np.diagonal(numbers.mass, axis1=1, axis2=2))
         caused = force / (diagonal + omega[:, None] ** 2 * mass)
-        return np.maximum(np.maximum(np.abs(states[:, :n]), np.abs(states[:, n:]) / omega[which, None]), caused[which])
+        lengths = np.maximum(self.system.turns.folded(states[:, :n]), np.abs(states[:, n:]) / omega[which, None])
+        return np.maximum(lengths, caused[which])
 
 
 def _entered(table: dict[bytes, int], row: Array) -> int:

@@ -26,7 +26,7 @@ from suboctave.model.elements.base import Array
 from suboctave.timedomain.batch import ROOM, Group, Method
 from suboctave.timedomain.generated import Index, Rows, module_of
 from suboctave.timedomain.law_code import LawCode, callback_shapes
-from suboctave.timedomain.layout import Layout, Numbers
+from suboctave.timedomain.layout import NO_TURN, Layout, Numbers
 
 __all__ = ["NewmarkMethod"]
 
@@ -45,6 +45,7 @@ def newmark_rows(layout: Layout, lanes: int) -> Rows:
         # within a step
         "lin": n, "before": n, "goal": m, "size": m, "y": m, "again": 1, "J": (k, m), "D": (m, m), "R": m,
         **callback_shapes(layout.called_back),
+        "fold": n if layout.system.turns else 0,
     }  # fmt: skip
     return Rows(lanes, shapes)
 
@@ -81,6 +82,8 @@ class NewmarkMethod(Method):
     def start(self, group: Group, alive: int) -> None:
         states, n = group.batch.states[group.members].T, self.layout.n
         group.row("x")[:], group.row("v")[:] = states[:n], states[n:]
+        if self.layout.system.turns:
+            group.row("fold")[:] = self.layout.turns[:, None] if group.batch.folded else NO_TURN
 
     def advance(self, group: Group, effort: int) -> bool:
         batch, last = group.batch, group.batch.total * self.stride
@@ -242,14 +245,24 @@ class _NewmarkCode(LawCode):
     def _record(self) -> None:
         n, z, code = self.n, self.z, self.code
         x, v, before, peak = (z(name, "i") for name in ("x", "v", "before", "peak"))
+        folded = "abs({x})"
+        if self.layout.system.turns:  # within half a turn, and half a turn where the step has passed the far side
+            fold = z("fold", "i")
+            folded = f"abs({{x}} - {fold} * np.floor({{x}} / {fold} + 0.5))"
+        passed = []
+        if self.layout.system.turns:
+            crossed = f"np.floor(begin / {fold} + 0.5) != np.floor({x} / {fold} + 0.5)"
+            passed = [f"now = 0.5 * {fold} if {crossed} else now"]
         with code.block("if measure:"), code.block(f"for i in range({n}):"):
             code.each(
                 # the velocity is linear within a step
                 f"turns = {v} * {before} < 0.0",
                 f"half = 0.5 * {z('h')}",
                 f"share = {before} / (({before} - {v}) if turns else 1.0)",
-                f"top = abs({x} - half * ({before} + {v}) + half * {before} * share)",
-                f"now = abs({x})",
+                f"begin = {x} - half * ({before} + {v})",
+                f"top = {folded.format(x=f'(begin + half * {before} * share)')}",
+                f"now = {folded.format(x=x)}",
+                *passed,
                 "top = top if turns & (top > now) else now",
                 f"{peak} = top if top > {peak} else {peak}",
             )

@@ -95,7 +95,8 @@ def shoot(
 
     def evaluate(at: Array) -> tuple[Array, Array, Passage]:
         final, transition, passage = flow(model, 0.0, at / model.scale, end, rtol)
-        return (final - at / model.scale), transition, passage
+        # the same position again, if by whole turns further
+        return system.turns.modulo(final * model.scale - at) / model.scale, transition, passage
 
     defect, transition, passage = evaluate(y)
     history = []

@@ -5,6 +5,7 @@ A state is `(x, x')`, shape (2n,), in the user's units; the loads are `amplitude
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -139,12 +140,19 @@ def flow(
 
 
 def largest_displacement(model: Field, passage: Passage, dof: int) -> float:
-    """Largest |x_dof| of a passage kept densely, at the zeros of the velocity, in the user's units.
+    """Largest |x_dof| of a passage kept densely, at the zeros of the velocity, in the user's units; of an angle within
+    half a turn.
 
     The zeros come from the interpolants; the few best are reached again by an integration of their own.
     """
-    n = model.n
-    ends = [abs(float(z[dof])) for z in passage.states]
+    n, origin = model.n, 0.0
+    turn = float(model.system.turns.periods[dof] / model.lengths[dof])
+    if math.isfinite(turn):  # within half a turn
+        cells = {math.floor(float(z[dof]) / turn + 0.5) for z in passage.states}
+        if len(cells) > 1:
+            return 0.5 * turn * float(model.lengths[dof])
+        origin = turn * cells.pop()
+    ends = [abs(float(z[dof]) - origin) for z in passage.states]
     candidates: list[tuple[float, int, float]] = []
     for i, step in enumerate(passage.steps):
         grid = np.linspace(step.begin, step.end, 7)
@@ -154,12 +162,12 @@ def largest_displacement(model: Field, passage: Passage, dof: int) -> float:
             drop = speed[k] - speed[k + 1]
             share = speed[k] / drop if drop != 0.0 else 0.0
             at = float(grid[k] + share * (grid[k + 1] - grid[k]))
-            candidates.append((abs(float(step.interpolant(at)[dof])), i, at))
+            candidates.append((abs(float(step.interpolant(at)[dof]) - origin), i, at))
     best = max(ends)
     candidates.sort(reverse=True)
     for size, i, at in candidates[:3]:
         if size >= best * (1.0 - 1e-6):
-            best = max(best, abs(_extreme(model, passage, i, at, dof)))
+            best = max(best, abs(_extreme(model, passage, i, at, dof) - origin))
     return best * float(model.lengths[dof])
 
 

@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_discrete_lyapunov
 
+from suboctave.model.angles import Turns
 from suboctave.model.elements.base import Array
 from suboctave.model.projected import ProjectedSystem
 from suboctave.model.system import System
@@ -52,10 +53,10 @@ class Trap:
     radius: float
     times: int = 1
 
-    def holds(self, states: Array) -> NDArray[np.bool_]:
-        """Which of the states (B, 2n) are inside."""
+    def holds(self, states: Array, turns: Turns) -> NDArray[np.bool_]:
+        """Which of the states (B, 2n) are inside, but for whole turns of angles."""
         with np.errstate(invalid="ignore"):
-            away = (states - self.point) @ self.factor.T
+            away = turns.modulo(states - self.point) @ self.factor.T
             inside: NDArray[np.bool_] = np.einsum("ij,ij->i", away, away) <= self.radius**2
         return inside
 
@@ -119,7 +120,7 @@ def _largest(
             derivative = factor @ motions.tangents @ back.T
             if float(np.linalg.norm(derivative, 2, axis=(1, 2)).max()) > _BOUND:
                 return False
-            if float(np.linalg.norm((motions.end - point) @ factor.T, axis=1).max()) > radius:
+            if float(np.linalg.norm(flow.system.turns.modulo(motions.end - point) @ factor.T, axis=1).max()) > radius:
                 return False
         return True
 

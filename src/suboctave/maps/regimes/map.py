@@ -315,7 +315,7 @@ _LONGER = 10
 
 #: verdicts on a trajectory
 AGREES, BEYOND, UNKNOWN = "agrees", "not followed", "unknown motion"
-LEFT, UNSETTLED, NOT_SOLVED = "left its motion", "not settled", "not solved"
+LEFT, UNSETTLED, NOT_SOLVED, ROTATES = "left its motion", "not settled", "not solved", "rotates"
 
 
 @dataclass(frozen=True)
@@ -329,8 +329,8 @@ class Landing:
     verdict
         "agrees" (also where neither has anything periodic); "not followed" (motions beyond the depth of the map, which
         says so); "unknown motion" (the map has none like it there); "left its motion" (a motion said to be stable was
-        left); "not settled" (nothing periodic, not yet or never); "not solved" (the motion of the map was not found
-        again at that point).
+        left); "rotates" (it turns or drifts: harmonic balance has no such motions); "not settled" (nothing periodic,
+        not yet or never); "not solved" (the motion of the map was not found again at that point).
     state
         (2n,) what it had reached, at phase 0 of the load.
     """
@@ -473,7 +473,8 @@ class _Check:
     def landings(self, transient: int, report: Any) -> list[Landing]:
         """What the trajectories settle on, with verdicts, in the order of the points."""
         reached = self._settled({start: start.state for start in self.starts}, transient, report)
-        moving = {s: a.points[-1] for s, a in reached.items() if not a.period and np.isfinite(a.points).all()}
+        open_ones = {s: a for s, a in reached.items() if not a.period and a.drift is None}
+        moving = {s: a.points[-1] for s, a in open_ones.items() if np.isfinite(a.points).all()}
         reached |= self._settled(moving, _LONGER * transient, None)
         judged = [self._judged(start, attractor) for start, attractor in reached.items()]
         return sorted([*self.unsolved, *judged], key=lambda one: (one.omega, one.value))
@@ -501,6 +502,8 @@ class _Check:
             verdict = AGREES
         elif start.arc is not None and attractor.period:
             verdict = LEFT
+        elif attractor.drift is not None or any(attractor.turns):
+            verdict = ROTATES
         elif beyond and (not attractor.period or attractor.period % min(beyond) == 0):
             verdict = BEYOND
         elif not attractor.period:
@@ -548,8 +551,10 @@ def _passes(orbit: PeriodicOrbit, state: Array) -> bool:
     halves = zip(
         (orbit.displacement(t), orbit.velocity(t)), np.split(state, 2), np.split(_extent(orbit), 2), strict=True
     )
-    for reached, given, extent in halves:
-        off += (masses @ (reached - given[:, None]) ** 2) / (float(masses @ extent**2) or 1.0)
+    for k, (reached, given, extent) in enumerate(halves):
+        away = (given[:, None] - reached).T
+        away = (away if k else system.turns.modulo(away)).T
+        off += (masses @ away**2) / (float(masses @ extent**2) or 1.0)
     return bool(off.min() <= _SAME**2)
 
 
