@@ -87,6 +87,10 @@ class Turns:
         return np.where(np.isfinite(self.periods), within, np.abs(displacements))
 
 
+#: those of a system without angles
+NO_TURNS = Turns(np.zeros((0, 0)))
+
+
 def read_angles(given: Any, n: int, names: Sequence[str]) -> tuple[Angle, ...]:
     """What a user gives: degrees of freedom by number or name, several that turn together as a list; or these as a
     mapping to the size of a turn (default 2 pi), a number or a text such as "2*pi/3".

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from suboctave.model.angles import Turns
+from suboctave.model.angles import NO_TURNS, Turns
 from suboctave.model.elements.base import Array
 
 __all__ = ["Drift", "Repeat", "drift_of", "extents", "floored", "period_of", "same_cycle"]
@@ -80,7 +80,7 @@ def drift_of(points: Array, omega: float, mass: Array, tolerance: float) -> Drif
     return None
 
 
-def period_of(points: Array, sizes: Array, tolerance: float, turns: Turns) -> Repeat:
+def period_of(points: Array, sizes: Array, tolerance: float, turns: Turns = NO_TURNS) -> Repeat:
     """The period of stroboscopic points (P, 2n), as long as they can show."""
     if not np.isfinite(points).all():
         return Repeat(0, np.inf)
@@ -105,7 +105,7 @@ def _stays_apart(points: Array, sizes: Array, n: int, turns: Turns) -> bool:
     return all(to_come <= _TO_COME * distance for distance in apart)
 
 
-def same_cycle(one: Array, other: Array, sizes: Array, tolerance: float, turns: Turns) -> bool:
+def same_cycle(one: Array, other: Array, sizes: Array, tolerance: float, turns: Turns = NO_TURNS) -> bool:
     """Whether two cycles of n points (n, 2n) are the same but for where they begin."""
     if one.shape != other.shape:
         return False
