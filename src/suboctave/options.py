@@ -12,14 +12,13 @@ refused.
 
 from __future__ import annotations
 
-import functools
 import inspect
 import re
 import textwrap
 from collections.abc import Callable
 from typing import Annotated, Any, ParamSpec, TypedDict, TypeVar, get_args, get_type_hints
 
-from suboctave.errors import suggest
+from suboctave.arguments import Positive, Progress, checked
 
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
@@ -28,9 +27,9 @@ Result = TypeVar("Result")
 class RunOptions(TypedDict, total=False):
     """Options of every verb that may take long."""
 
-    progress: Annotated[Any, "None, True (a bar), or a callable taking (share done, text)."]
+    progress: Annotated[Progress, "None, True (a bar), or a callable taking (share done, text)."]
     seconds: Annotated[
-        float | None,
+        Positive | None,
         "Time limit. What was computed by then is given, as after Ctrl-C (`interrupted`); a TimeLimitError where that "
         "is nothing.",
     ]
@@ -41,32 +40,24 @@ def with_options(declared: Any) -> Callable[[Callable[Arguments, Result]], Calla
 
     The verb raises a TypeError for other names.
     """
-    types = {name: get_args(hint) for name, hint in get_type_hints(declared, include_extras=True).items()}
+    hints, kinds = get_type_hints(declared, include_extras=True), get_type_hints(declared)
+    meanings = {name: next(one for one in get_args(hint) if isinstance(one, str)) for name, hint in hints.items()}
 
     def decorated(verb: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
         own = [p for p in inspect.signature(verb).parameters.values() if p.kind is not p.VAR_KEYWORD]
         taken = {p.name for p in own}
         more = [
             inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=_short(kind))
-            for name, (kind, _) in types.items()
+            for name, kind in kinds.items()
             if name not in taken
         ]
-        known = {*taken, *types}
-
-        @functools.wraps(verb)
-        def checked(*positional: Arguments.args, **named: Arguments.kwargs) -> Result:
-            unknown = next((name for name in named if name not in known), None)
-            if unknown is not None:
-                tail = suggest(unknown, known, limit=len(known))
-                raise TypeError(f"{verb.__name__}() got an unexpected keyword argument {unknown!r}{tail}")
-            return verb(*positional, **named)
-
-        returns = inspect.signature(verb).return_annotation
-        described: Any = checked
-        described.__signature__ = inspect.Signature([*own, *more], return_annotation=returns)
+        known = {**getattr(verb, "__hints__", {}), **{p.name: hints[p.name] for p in more}}
+        signature = inspect.Signature([*own, *more], return_annotation=inspect.signature(verb).return_annotation)
+        described: Any = checked(verb, hints=known, signature=signature)
+        described.__signature__, described.__hints__ = signature, known
         if verb.__doc__ is not None:
             fill = textwrap.TextWrapper(108, initial_indent="    ", subsequent_indent="    ").fill
-            listed = "".join(f"{p.name}\n{fill(types[p.name][1])}\n" for p in more)
+            listed = "".join(f"{p.name}\n{fill(meanings[p.name])}\n" for p in more)
             section = f"Other Parameters\n----------------\n{listed}"
             if "Raises\n" not in verb.__doc__:
                 section += "\nRaises\n------\nInputError\n    Wrong input, before any work.\n"
@@ -79,4 +70,5 @@ def with_options(declared: Any) -> Callable[[Callable[Arguments, Result]], Calla
 
 def _short(kind: Any) -> str:
     """A type by the names of its classes alone."""
-    return re.sub(r"\b(?:\w+\.)+", "", inspect.formatannotation(kind))
+    text = re.sub(r"\b(?:\w+\.)+", "", inspect.formatannotation(kind))
+    return re.sub(r"^Optional\[(.*)\]$", r"\1 | None", text)

@@ -27,16 +27,19 @@ def harmonic_load(**options):
 
 
 RESPONSE = {
-    "no system": (lambda s, b: so.frequency_response(3, (1, 2)), "first argument must be a System, not int"),
+    "no system": (lambda s, b: so.frequency_response(3, (1, 2)), "system must be a System, not 3"),
     "no load": (lambda s, b: so.frequency_response(so.System(1.0, 0.1, 1.0), (1, 2)), "no periodic load: add loads="),
-    "one frequency": (lambda s, b: so.frequency_response(s, 1.0), r"omega=1\.0: give two numbers"),
-    "three frequencies": (lambda s, b: so.frequency_response(s, (1, 2, 3)), "give two numbers, "),
+    "one frequency": (
+        lambda s, b: so.frequency_response(s, 1.0),
+        r"omega must be two finite numbers, \(first, second\), not 1\.0",
+    ),
+    "three frequencies": (lambda s, b: so.frequency_response(s, (1, 2, 3)), "omega must be two finite numbers"),
     "equal ends": (lambda s, b: so.frequency_response(s, (1, 1)), "two different finite ends"),
-    "nan": (lambda s, b: so.frequency_response(s, (NAN, 1)), "two different finite ends"),
-    "infinite": (lambda s, b: so.frequency_response(s, (1, INF)), "two different finite ends"),
+    "nan": (lambda s, b: so.frequency_response(s, (NAN, 1)), r"omega\[0\] must be a finite number, not nan"),
+    "infinite": (lambda s, b: so.frequency_response(s, (1, INF)), r"omega\[1\] must be a finite number, not inf"),
     "negative": (lambda s, b: so.frequency_response(s, (-1, 1)), "frequencies are positive, in rad per unit time"),
     "zero": (lambda s, b: so.frequency_response(s, (0, 1)), "frequencies are positive"),
-    "text": (lambda s, b: so.frequency_response(s, ("low", "high")), "give two numbers"),
+    "text": (lambda s, b: so.frequency_response(s, ("low", "high")), r"omega\[0\] must be a finite number, not 'low'"),
     "no harmonics": (lambda s, b: so.frequency_response(s, (1, 2), 0), "whole number of at least 1.*not 0"),
     "negative harmonics": (lambda s, b: so.frequency_response(s, (1, 2), -3), "whole number of at least 1.*not -3"),
     "half a harmonic": (lambda s, b: so.frequency_response(s, (1, 2), 7.5), "whole number.*not 7.5"),
@@ -47,7 +50,10 @@ RESPONSE = {
         "load at 5 omega needs harmonics=5 or more",
     ),
     "no step": (lambda s, b: so.frequency_response(s, (1, 2), max_step=0), "max_step must be a positive number"),
-    "nan step": (lambda s, b: so.frequency_response(s, (1, 2), max_step=NAN), "max_step must be a positive number"),
+    "nan step": (
+        lambda s, b: so.frequency_response(s, (1, 2), max_step=NAN),
+        "max_step must be a positive number, not nan",
+    ),
     "text step": (lambda s, b: so.frequency_response(s, (1, 2), max_step="0.1"), "max_step must be a positive number"),
     "tiny step": (lambda s, b: so.frequency_response(s, (1, 2), max_step=1e-9), "max_step=1e-09"),
     "dof": (lambda s, b: so.frequency_response(s, (1, 2), observe=1), "1 DOFs, numbered from 0"),
@@ -56,8 +62,14 @@ RESPONSE = {
         lambda s, b: so.frequency_response(s, (1, 2), observe="x"),
         "observe='x' is none of the degrees of freedom: they have no names",
     ),
-    "bare function": (lambda s, b: so.frequency_response(s, (1, 2), events=[len]), "must be Event objects"),
-    "number for events": (lambda s, b: so.frequency_response(s, (1, 2), events=3), "must be Event objects"),
+    "bare function": (
+        lambda s, b: so.frequency_response(s, (1, 2), events=[len]),
+        r"events\[0\] must be an Event, not <built-in",
+    ),
+    "number for events": (
+        lambda s, b: so.frequency_response(s, (1, 2), events=3),
+        "events must be an Event or a list of Events, not 3",
+    ),
     "same name": (
         lambda s, b: so.frequency_response(s, (1, 2), events=[so.Event("a", len), so.Event("a", len)]),
         "same name",
@@ -66,13 +78,16 @@ RESPONSE = {
         lambda s, b: so.frequency_response(s, (1, 2), events=[so.Event("LP", len)]),
         "'LP': that is the name of a kind",
     ),
-    "event without function": (lambda s, b: so.Event("a", 3), "must be callable, got 3"),
-    "event without name": (lambda s, b: so.Event("", len), "needs a name"),
-    "progress": (lambda s, b: so.frequency_response(s, (1, 2), progress=3), "None, True or a callable"),
-    "newton": (lambda s, b: so.frequency_response(s, (1, 2), newton={}), "newton must be a NewtonOptions, not dict"),
-    "stepping": (lambda s, b: so.frequency_response(s, (1, 2), stepping=0.1), "must be a SteppingOptions, not float"),
-    "newton value": (lambda s, b: so.NewtonOptions(tolerance=-1), r"tolerance in \(0, 1e-2\)"),
-    "stepping value": (lambda s, b: so.SteppingOptions(max_step=0.0), "must lie above min_step"),
+    "event without function": (lambda s, b: so.Event("a", 3), "function must be a function of 1 argument, not 3"),
+    "event without name": (lambda s, b: so.Event("", len), "name must be a text that is not empty"),
+    "progress": (
+        lambda s, b: so.frequency_response(s, (1, 2), progress=3),
+        "progress must be a function of 2 arguments, True or False, not 3",
+    ),
+    "newton": (lambda s, b: so.frequency_response(s, (1, 2), newton={}), "newton must be a NewtonOptions, not {}"),
+    "stepping": (lambda s, b: so.frequency_response(s, (1, 2), stepping=0.1), "must be a SteppingOptions, not 0.1"),
+    "newton value": (lambda s, b: so.NewtonOptions(tolerance=-1), "NewtonOptions: tolerance must be a positive number"),
+    "stepping value": (lambda s, b: so.SteppingOptions(max_step=0.0), "max_step must be a positive number, not 0.0"),
     "start of four numbers": (
         lambda s, b: so.frequency_response(s, (1, 2), start=[1.0, 2.0, 3.0, 4.0]),
         r"state \(x, dx/dt\) of length 2, or coefficients of shape \(2 H \+ 1, 1\)",
@@ -90,15 +105,18 @@ RESPONSE = {
 }
 
 ALONG = {
-    "no start": (lambda s, b: so.continue_branch(3, "F", (0, 1)), "PeriodicOrbit, a point of a branch, .*not int"),
+    "no start": (lambda s, b: so.continue_branch(3, "F", (0, 1)), "start must be a System, a PeriodicOrbit, .*not 3"),
     "a branch": (lambda s, b: so.continue_branch(b, "F", (0, 1)), "not Branch"),
     "misspelt": (lambda s, b: so.continue_branch(b.orbits[0], "alhpa", (0, 2)), "did you mean 'alpha'"),
-    "no name": (lambda s, b: so.continue_branch(b.orbits[0], 3, (0, 2)), "unknown parameter 3"),
+    "no name": (lambda s, b: so.continue_branch(b.orbits[0], 3, (0, 2)), "parameter must be a text, not 3"),
     "equal": (lambda s, b: so.continue_branch(b.orbits[0], "F", (0, 0)), "two different finite ends"),
-    "one number": (lambda s, b: so.continue_branch(b.orbits[0], "F", 1.0), "give two numbers"),
+    "one number": (lambda s, b: so.continue_branch(b.orbits[0], "F", 1.0), "bounds must be two finite numbers"),
     "outside": (lambda s, b: so.continue_branch(b.orbits[0], "F", (2, 3)), r"F=0\.3, outside the bounds \(2, 3\)"),
     "another omega": (lambda s, b: so.continue_branch(b.orbits[0], "F", (0, 2), omega=9.0), "differs.*leave it out"),
-    "text omega": (lambda s, b: so.continue_branch(b.orbits[0], "F", (0, 2), omega="a"), "differs.*leave it out"),
+    "text omega": (
+        lambda s, b: so.continue_branch(b.orbits[0], "F", (0, 2), omega="a"),
+        "omega must be a finite number, not 'a'",
+    ),
     "no omega": (lambda s, b: so.continue_branch(s, "F", (0, 1)), "needs a positive omega="),
     "negative omega": (lambda s, b: so.continue_branch(s, "F", (0, 1), omega=-1.0), "needs a positive omega="),
     "omega twice": (lambda s, b: so.continue_branch(s, "omega", (1, 2), omega=1.5), "leave it out"),
@@ -112,7 +130,10 @@ ALONG = {
     "no harmonics": (lambda s, b: so.continue_branch(b.orbits[0], "F", (0, 2), harmonics=0), "whole number"),
     "step": (lambda s, b: so.continue_branch(b.orbits[0], "F", (0, 2), max_step=-1), "positive number"),
     "dof": (lambda s, b: so.continue_branch(b.orbits[0], "F", (0, 2), observe=4), "out of range"),
-    "events": (lambda s, b: so.continue_branch(b.orbits[0], "F", (0, 2), events=[3]), "Event objects"),
+    "events": (
+        lambda s, b: so.continue_branch(b.orbits[0], "F", (0, 2), events=[3]),
+        r"events\[0\] must be an Event, not 3",
+    ),
     "no load": (
         lambda s, b: so.continue_branch(so.System(1.0, 0.1, "k", parameters={"k": 1.0}), "k", (1, 2), omega=1.0),
         "no periodic load",
@@ -120,10 +141,13 @@ ALONG = {
 }
 
 SINGLE = {
-    "verify number": (lambda s, b: so.verify(3), "expected a PeriodicOrbit, .*not int"),
+    "verify number": (lambda s, b: so.verify(3), "what must be a PeriodicOrbit, .*or a Branch, not 3"),
     "tolerance": (lambda s, b: so.verify(b.orbits[0], tolerance=-1.0), "tolerance must be a number between 0 and 1"),
-    "tolerance text": (lambda s, b: so.verify(b.orbits[0], tolerance="a"), "tolerance must be a number"),
-    "stability text": (lambda s, b: so.stability("x"), "not str"),
+    "tolerance text": (
+        lambda s, b: so.verify(b.orbits[0], tolerance="a"),
+        "tolerance must be a number between 0 and 1, not 'a'",
+    ),
+    "stability text": (lambda s, b: so.stability("x"), "orbit must be a PeriodicOrbit, .*not 'x'"),
     "stability branch": (lambda s, b: so.stability(b), "not Branch"),
     "harmonic": (lambda s, b: b.harmonic(0.5), "no harmonic of a motion"),
     "dof of a harmonic": (lambda s, b: b.harmonic(1, dof=3), "dof=3 is out of range"),

@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from suboctave.analysis.options import Inherited, settings_of
+from suboctave.arguments import checked
 from suboctave.bifurcation.bifurcation import TrackedEvent
 from suboctave.continuation import NewtonOptions
 from suboctave.continuation.linear import length, one_thread
@@ -37,6 +38,7 @@ _CORRECTION = 1e-9
 _ITERATIONS = 12
 
 
+@checked
 @limited
 def locate_extremum(
     extremum: TrackedEvent,

@@ -8,11 +8,12 @@ What a verb follows, and the branch that comes of it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from typing import Annotated, Any, TypeVar, cast
 
+from suboctave.arguments import Positive
 from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.continuation import Event, NewtonOptions, SteppingOptions
 from suboctave.continuation.linear import one_thread
@@ -22,7 +23,7 @@ from suboctave.curves.motion import MotionProblem
 from suboctave.curves.starts import Harmonics, linear_response, make_curve
 from suboctave.curves.trace import Settings, Trace
 from suboctave.curves.verdicts import with_verdicts
-from suboctave.errors import InputError, is_number, shortened
+from suboctave.errors import InputError
 from suboctave.floquet.methods import METHODS, StabilityMethod, method_of
 from suboctave.harmonic.linear_part import LinearPart
 from suboctave.harmonic.truncation import AdaptiveHarmonics
@@ -41,7 +42,7 @@ class SearchOptions(RunOptions, total=False):
     """Options of all verbs that follow curves, searches over a design parameter among them."""
 
     max_step: Annotated[
-        float | None,
+        Positive | None,
         "Largest distance between neighbours in scaled arclength (short for `stepping=SteppingOptions(max_step=...)`).",
     ]
     observe: Annotated[
@@ -73,7 +74,7 @@ class TrackOptions(SearchOptions, total=False):
 class CurveOptions(TrackOptions, total=False):
     """Options of verbs that follow a branch of periodic motions."""
 
-    events: Annotated[Sequence[Event] | None, "User's events, located along the branch."]
+    events: Annotated[Event | Sequence[Event] | None, "User's events, located along the branch."]
 
 
 Options = TypeVar("Options", bound=SearchOptions)
@@ -86,16 +87,14 @@ def handed_on(options: Options) -> Options:
 
 def settings_of(system: System, options: Mapping[str, Any]) -> Settings:
     """The options of a verb, checked; raises InputError."""
-    stepping = _instance(options, "stepping", SteppingOptions)
+    stepping = options.get("stepping") or SteppingOptions()
     max_step = options.get("max_step")
     if max_step is not None:
-        if not (is_number(max_step) and max_step > 0.0):
-            raise InputError(f"max_step must be a positive number, not {shortened(max_step)}")
         if max_step <= stepping.min_step:
             raise InputError(f"max_step={max_step:g} is below the smallest step that is taken, {stepping.min_step:g}")
         stepping = replace(stepping, max_step=float(max_step), initial_step=min(stepping.initial_step, float(max_step)))
     return Settings(
-        _instance(options, "newton", NewtonOptions),
+        options.get("newton") or NewtonOptions(),
         stepping,
         method_of(options.get("stability")),
         _events(options.get("events")),
@@ -104,28 +103,14 @@ def settings_of(system: System, options: Mapping[str, Any]) -> Settings:
     )
 
 
-def _events(given: Any) -> tuple[Event, ...]:
-    events = () if given is None else given
-    events = tuple(events) if isinstance(events, Iterable) and not isinstance(events, Event) else (events,)
-    for event in events:
-        if not isinstance(event, Event):
-            raise InputError(f"events must be Event objects, got {shortened(event)}")
+def _events(given: Event | Sequence[Event] | None) -> tuple[Event, ...]:
+    events = () if given is None else (given,) if isinstance(given, Event) else tuple(given)
     if len({e.name for e in events}) < len(events):
         raise InputError("two events have the same name")
     for event in events:
         if event.name in KINDS:
             raise InputError(f"an event cannot be called {event.name!r}: that is the name of a kind of bifurcation")
     return events
-
-
-Kind = TypeVar("Kind")
-
-
-def _instance(options: Mapping[str, Any], name: str, kind: type[Kind]) -> Kind:
-    given = options.get(name)
-    if given is not None and not isinstance(given, kind):
-        raise InputError(f"{name} must be a {kind.__name__}, not {type(given).__name__}")
-    return kind() if given is None else given
 
 
 # ------------------------------------------------------------------------------------------------ what a result keeps

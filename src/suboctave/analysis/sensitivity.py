@@ -18,6 +18,7 @@ import numpy as np
 import scipy.linalg
 
 from suboctave.analysis.options import Inherited
+from suboctave.arguments import checked
 from suboctave.bifurcation.bifurcation import Bifurcation, TrackedEvent
 from suboctave.continuation.linear import length, one_thread
 from suboctave.curves.kinds.multiple import MultipleEquations
@@ -38,6 +39,7 @@ _UNFOLDED = 1e-9
 _PARTED = 1e-6
 
 
+@checked(result=True)
 @dataclass(frozen=True, repr=False)
 class Sensitivity(Mapping[str, Mapping[str, float]]):
     """Derivatives of a bifurcation's free parameters and amplitude by the parameters that are held.
@@ -103,6 +105,7 @@ class Sensitivity(Mapping[str, Mapping[str, float]]):
         return "\n".join(lines)
 
 
+@checked
 def sensitivity(bifurcation: Bifurcation, parameters: Sequence[str] | None = None) -> Sensitivity:
     """Derivatives of where a bifurcation lies, and of its amplitude, by the parameters that were held.
 

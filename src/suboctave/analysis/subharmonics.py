@@ -20,6 +20,7 @@ from typing import Any, Unpack
 import numpy as np
 
 from suboctave.analysis.options import CurveOptions, CurveRun, SearchOptions, settings_of
+from suboctave.arguments import checked
 from suboctave.continuation import CurvePoint, NewtonOptions
 from suboctave.continuation.linear import length, one_thread
 from suboctave.continuation.newton import correct
@@ -49,6 +50,7 @@ _SUBHARMONIC = 1e-3
 _FREE_ITERATIONS = 12
 
 
+@checked
 @dataclass(frozen=True)
 class Seeds:
     """Where sub-harmonic motions are looked for.
@@ -198,6 +200,7 @@ def subharmonic_start(curve: MotionProblem, run: CurveRun) -> Trace:
     return both_ways(point, run.ahead, run.bounds, run.settings)
 
 
+@checked
 @limited
 def periodic_orbit(
     system: System,

@@ -9,6 +9,7 @@ from typing import Any, overload
 
 import numpy as np
 
+from suboctave.arguments import checked
 from suboctave.bifurcation.gaps import GrazingContact
 from suboctave.bifurcation.normal_form import FORMS, NormalForm, normal_form
 from suboctave.errors import ConvergenceError, InputError, suggest
@@ -37,6 +38,7 @@ def target_multiplier(kind: str, angle: float) -> complex | None:
     return cmath.exp(1j * angle) if row.multiplier is None else complex(row.multiplier)
 
 
+@checked(result=True)
 @dataclass(frozen=True, eq=False, repr=False)
 class CriticalMotion:
     """The perturbation of a motion that neither grows nor decays at a bifurcation, at most one in all displacements.
@@ -61,6 +63,7 @@ class CriticalMotion:
         return result[:, 0] if np.ndim(t) == 0 else result
 
 
+@checked(result=True)
 @dataclass(frozen=True, eq=False)
 class Bifurcation:
     """A motion at which the response changes its nature, or a contact begins or ceases to touch.
@@ -261,6 +264,7 @@ class Bifurcation:
         return f"<{self.kind} at omega={self.omega:.9g}{free}{doubt}, amplitude={self.amplitude:.7g}>"
 
 
+@checked(result=True)
 class BifurcationList:
     """Located bifurcations in the order met; `["PD"]` gives those of a kind, `[0]` one by position.
 
@@ -331,6 +335,7 @@ CURVES_THROUGH = {
 _AT_ENDS = {"R1": 1.0, "R2": -1.0, "GPD": -1.0}
 
 
+@checked(result=True)
 @dataclass(frozen=True, eq=False, repr=False)
 class TrackedEvent(Bifurcation):
     """A bifurcation of a tracked curve at which the curve turns, or at which a second condition holds.

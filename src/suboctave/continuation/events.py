@@ -10,11 +10,12 @@ from typing import Any
 
 import scipy
 
+from suboctave.arguments import Name, checked
 from suboctave.continuation.linear import length
 from suboctave.continuation.newton import NewtonOptions, closely, correct
 from suboctave.continuation.point import CurvePoint, between, make_point
 from suboctave.continuation.problem import Array
-from suboctave.errors import ConvergenceError, InputError
+from suboctave.errors import ConvergenceError
 
 #: distance from the chord between two neighbours, in units of its length, from which on a point is on another curve
 _ELSEWHERE = 2.0
@@ -22,6 +23,7 @@ _ELSEWHERE = 2.0
 _LARGE = 30.0
 
 
+@checked(methods=False)
 @dataclass(frozen=True)
 class Event:
     """A user's event: a zero of a function of the solution, located along the curve and reported under its name.
@@ -32,14 +34,8 @@ class Event:
         Takes what the verb stores per point (a `PeriodicOrbit`), returns a number that changes sign at the event.
     """
 
-    name: str
+    name: Name
     function: Callable[[Any], float]
-
-    def __post_init__(self) -> None:
-        if not self.name or not isinstance(self.name, str):
-            raise InputError(f"an Event needs a name, got {self.name!r}")
-        if not callable(self.function):
-            raise InputError(f"Event {self.name!r}: function must be callable, got {self.function!r}")
 
 
 class Bracket:

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from suboctave.arguments import Count, Positive, checked
 from suboctave.compiled import kernel
 from suboctave.continuation.bounds import Bounds, Range
 from suboctave.continuation.ending import Ending, EndReason
@@ -22,7 +23,7 @@ from suboctave.continuation.linear import cosine, distance, length
 from suboctave.continuation.newton import NewtonOptions, Solved, closely, correct
 from suboctave.continuation.point import CurvePoint, between, make_point, solved_again
 from suboctave.continuation.problem import Array, Curve
-from suboctave.errors import ConvergenceError, InputError, check_numbers
+from suboctave.errors import ConvergenceError, InputError
 
 #: points behind the last one that a prediction takes into account
 _BEHIND = 2
@@ -48,6 +49,7 @@ _STRAIGHT = 0.01
 _SHARP = 0.75
 
 
+@checked(methods=False)
 @dataclass(frozen=True)
 class SteppingOptions:
     """How far the engine steps.
@@ -66,23 +68,20 @@ class SteppingOptions:
         Points after which the curve ends with a reason.
     """
 
-    max_step: float = 0.06
-    initial_step: float = 0.01
-    min_step: float = 1e-7
-    deviation: float = 0.01
-    angle: float = 0.3
-    growth: float = 1.0
-    max_points: int = 20000
+    max_step: Positive = 0.06
+    initial_step: Positive = 0.01
+    min_step: Positive = 1e-7
+    deviation: Positive = 0.01
+    angle: Positive = 0.3
+    growth: Positive = 1.0
+    max_points: Count = 20000
 
     def __post_init__(self) -> None:
-        check_numbers(**vars(self))
-        if not 0.0 < self.min_step <= self.initial_step:
-            raise InputError(
-                f"initial_step={self.initial_step:g} must be positive and not below min_step={self.min_step:g}"
-            )
-        if not self.min_step < self.max_step < math.inf:
+        if self.initial_step < self.min_step:
+            raise InputError(f"initial_step={self.initial_step:g} must not be below min_step={self.min_step:g}")
+        if self.max_step <= self.min_step:
             raise InputError(f"max_step={self.max_step:g} must lie above min_step={self.min_step:g}")
-        if self.deviation <= 0.0 or not 0.0 < self.angle < 1.6 or self.growth < 1.0 or self.max_points < 2:
+        if self.angle >= 1.6 or self.growth < 1.0 or self.max_points < 2:
             raise InputError(f"SteppingOptions out of range: {self}")
 
     @property

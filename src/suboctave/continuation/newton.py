@@ -15,9 +15,10 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
+from suboctave.arguments import Count, Length, Positive, checked
 from suboctave.continuation.linear import Factor, distance, length
 from suboctave.continuation.problem import Array, Evaluation, Problem
-from suboctave.errors import ConvergenceError, InputError, check_numbers
+from suboctave.errors import ConvergenceError, InputError
 from suboctave.interruption import check_time
 
 #: correction in scaled arclength below which the Jacobian is not computed anew
@@ -34,6 +35,7 @@ _ROUNDING = 1e-13
 _SHARE, _LEAST = 1e-3, 1e-13
 
 
+@checked(methods=False)
 @dataclass(frozen=True)
 class NewtonOptions:
     """How a point is solved for.
@@ -54,11 +56,11 @@ class NewtonOptions:
         tolerance.
     """
 
-    tolerance: float = 1e-10
-    correction: float = 1e-7
-    iterations: int = 8
+    tolerance: Positive = 1e-10
+    correction: Positive = 1e-7
+    iterations: Count = 8
     damped: bool = False
-    longest: float = math.inf
+    longest: Length = math.inf
     rounding: bool = False
 
     def share(self, step: Array) -> float:
@@ -66,11 +68,8 @@ class NewtonOptions:
         return 1.0 if self.longest == math.inf else self.longest / max(self.longest, length(step))
 
     def __post_init__(self) -> None:
-        check_numbers(tolerance=self.tolerance, correction=self.correction, iterations=self.iterations)
-        if not (0.0 < self.tolerance < 1e-2 and 0.0 < self.correction < 1.0 and self.iterations >= 1):
-            raise InputError(
-                f"NewtonOptions out of range: {self}; tolerance in (0, 1e-2), correction in (0, 1), iterations >= 1"
-            )
+        if not (self.tolerance < 1e-2 and self.correction < 1.0):
+            raise InputError(f"NewtonOptions out of range: {self}; tolerance in (0, 1e-2), correction in (0, 1)")
 
 
 #: the equations that a point solves

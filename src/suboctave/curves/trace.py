@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
+from suboctave.arguments import checked
 from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.continuation import Event, NewtonOptions, SteppingOptions
 from suboctave.continuation.ending import Ending, EndReason, interruption_of
@@ -17,6 +18,7 @@ from suboctave.lazy import lazy
 from suboctave.progress import CurveProgress, Report
 
 
+@checked(result=True)
 @dataclass(frozen=True, eq=False)
 class BranchPoint:
     """One point of a branch: orbit, multipliers, position in scaled arclength, Newton iterations.
@@ -41,6 +43,7 @@ class BranchPoint:
         return self.method.along(self.orbit.state())
 
 
+@checked(result=True)
 @dataclass(frozen=True, eq=False)
 class TrackedPoint(BranchPoint):
     """One point of a tracked curve: a branch point with the extra unknown and the coefficient of its normal form.

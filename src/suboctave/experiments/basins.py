@@ -17,6 +17,7 @@ from typing import Annotated, Any, Self, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
+from suboctave.arguments import checked
 from suboctave.errors import InputError, path_of
 from suboctave.experiments.basin_attractors import BasinAttractor, Catalogue, Given, enter_attractors, read_attractors
 from suboctave.experiments.common import (
@@ -52,6 +53,7 @@ _CLASSIFIED = 60
 _OTHERS = {APERIODIC: "aperiodic", GONE: "left the range", OPEN: "not computed", DRIFTING: "drifting"}
 
 
+@checked(result=True)
 @dataclass(eq=False, repr=False)
 class Basins(TimeResult):
     """Basins of attraction on a plane of states at phase 0 of the load.

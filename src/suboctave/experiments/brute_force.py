@@ -15,6 +15,7 @@ from typing import Annotated, Any, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
+from suboctave.arguments import checked
 from suboctave.errors import InputError, suggest
 from suboctave.experiments.common import (
     FEW,
@@ -44,6 +45,7 @@ _CARRIED = ("up", "down")
 _STARTS = (*_CARRIED, "rest")
 
 
+@checked(result=True)
 @dataclass(eq=False, repr=False)
 class BruteForceDiagram(TimeResult):
     """Stroboscopic points over a parameter, for S ways to start and V values.

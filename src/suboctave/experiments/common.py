@@ -28,6 +28,7 @@ from typing import (
 import numpy as np
 from numpy.typing import NDArray
 
+from suboctave.arguments import checked
 from suboctave.errors import InputError, is_number, shortened, suggest
 from suboctave.model.elements.base import Array, numbers_of
 from suboctave.model.elements.coupled import as_coupled
@@ -406,6 +407,7 @@ def _entries(made: Any) -> Iterator[tuple[str, Any, On]]:
             yield name, kind, places[0] if places else On()
 
 
+@checked(result=True)
 class TimeResult(Stored, Pictured):
     """A result of time integration: trajectories, sections, diagrams, exponents, basins, tests, verifications.
 

@@ -27,6 +27,7 @@ from typing import Annotated, Any, ClassVar, Literal, Unpack, overload
 
 import numpy as np
 
+from suboctave.arguments import checked
 from suboctave.errors import ConvergenceError, InputError, check_numbers, shortened, suggest
 from suboctave.experiments.common import On, ParallelOptions, TimeResult, check_continuous, of_structures
 from suboctave.experiments.poincare import state_sizes
@@ -46,6 +47,7 @@ _STRETCHES = 4
 _SURE, _LEAST = 5.0, 1e-5
 
 
+@checked(result=True)
 @dataclass(eq=False, repr=False)
 class LyapunovExponents(TimeResult):
     """Lyapunov exponents of the motion that a trajectory settles on.
@@ -322,6 +324,7 @@ def _starts(flow: Flow, first: Array, omega: float, values: Mapping[str, float],
     return motions.end[0] + _APART * sizes * away
 
 
+@checked
 @dataclass(frozen=True)
 class TwoTrajectories:
     """How two trajectories are compared.
@@ -375,6 +378,7 @@ class TwoTrajectories:
         return self.offset if isinstance(self.offset, tuple) else (float(self.offset),)
 
 
+@checked(result=True)
 @dataclass(eq=False, repr=False)
 class Separation(TimeResult):
     """How fast two trajectories parted, for many settings.

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Protocol, Unpack, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from suboctave.arguments import checked
 from suboctave.errors import InputError
 from suboctave.experiments.common import (
     On,
@@ -46,6 +47,7 @@ class CriticalCurve(Protocol):
         """Values of a parameter along the curve."""
 
 
+@checked(result=True)
 @dataclass(eq=False, repr=False)
 class LyapunovMap(TimeResult):
     """The largest Lyapunov exponent over frequency and a parameter.

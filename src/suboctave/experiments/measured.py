@@ -9,12 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
+from suboctave.arguments import checked
 from suboctave.errors import InputError, is_number, path_of, printable, suggest
 from suboctave.model.elements.base import Array
 
 _UNITS = {"rad/s": 1.0, "Hz": 2.0 * math.pi}
 
 
+@checked(result=True)
 @dataclass(frozen=True, eq=False)
 class Measured:
     """Measured amplitudes of the fundamental, in the model's units: `omega` (N,) and `amplitude` (N,)."""
@@ -30,6 +32,7 @@ class Measured:
         return f"Measured({self.label!r}, {len(self)} points, omega from {self.omega.min():g} to {self.omega.max():g})"
 
 
+@checked
 def read_measured(
     path: str | Path,
     *,

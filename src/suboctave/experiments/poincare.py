@@ -9,6 +9,7 @@ from typing import Annotated, Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from suboctave.arguments import checked
 from suboctave.errors import InputError
 from suboctave.experiments.common import (
     On,
@@ -32,6 +33,7 @@ from suboctave.timedomain.flow import Flow
 from suboctave.timedomain.period_recognition import Drift, drift_of, extents, period_of, same_cycle
 
 
+@checked(result=True)
 @dataclass(eq=False, repr=False)
 class PoincareSections(TimeResult):
     """Stroboscopic points of B trajectories.
@@ -220,6 +222,7 @@ _WHOLE = 1e-5
 _LOOKED_AT = 16
 
 
+@checked(result=True)
 @dataclass(frozen=True, eq=False)
 class Attractor:
     """What a trajectory has settled on, by its stroboscopic points.

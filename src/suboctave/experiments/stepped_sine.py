@@ -21,6 +21,7 @@ from typing import Annotated, Any, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
+from suboctave.arguments import checked
 from suboctave.errors import InputError, is_number, shortened, suggest
 from suboctave.experiments.common import (
     FEW,
@@ -257,6 +258,7 @@ def _tap(system: System, tap: Any, grid: Array) -> tuple[float, int, float] | No
     return float(tap[0]), observed_dof(system, tap[1]), float(tap[2])
 
 
+@checked(result=True)
 @dataclass(eq=False, repr=False)
 class SteppedSine(TimeResult):
     """A virtual stepped-sine test in S directions over V frequencies.

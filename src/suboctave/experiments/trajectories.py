@@ -8,6 +8,7 @@ from typing import Annotated, Any, Unpack
 
 import numpy as np
 
+from suboctave.arguments import checked
 from suboctave.experiments.common import (
     FEW,
     On,
@@ -26,6 +27,7 @@ from suboctave.progress import reporting
 from suboctave.timedomain.flow import Flow
 
 
+@checked(result=True)
 @dataclass(eq=False, repr=False)
 class Trajectory(TimeResult):
     """A motion in time.

@@ -21,6 +21,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from suboctave.arguments import checked
 from suboctave.errors import ConvergenceError, InputError, shortened, suggest
 from suboctave.floquet.hill import hill_beside, hill_multipliers
 from suboctave.floquet.monodromy import floquet_multipliers
@@ -63,6 +64,7 @@ class StabilityMethod(ABC):
         return result
 
 
+@checked(methods=False)
 @dataclass(frozen=True)
 class Monodromy(StabilityMethod):
     """Multipliers as eigenvalues of the monodromy matrix, a product of matrix exponentials over one period."""
@@ -74,6 +76,7 @@ class Monodromy(StabilityMethod):
         return floquet_multipliers(state)
 
 
+@checked(methods=False)
 @dataclass(frozen=True)
 class Hill(StabilityMethod):
     """Multipliers as eigenvalues in the frequency domain; see `suboctave.floquet.hill`.
@@ -102,6 +105,7 @@ class Hill(StabilityMethod):
         return hill_beside(state, known)
 
 
+@checked(methods=False)
 @dataclass(frozen=True)
 class Arbitration(StabilityMethod):
     """The monodromy matrix, and its witnesses where it leaves the verdict open: the default.

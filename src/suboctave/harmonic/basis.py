@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from suboctave.arguments import Count, checked
 from suboctave.errors import InputError, is_number, shortened
 
 Array = NDArray[np.float64]
@@ -43,6 +44,7 @@ def harmonic_index(k: float, nu: int) -> int:
     raise InputError(f"k={k:g} is no harmonic of a motion of period {of}, which has {has}{near}")
 
 
+@checked(methods=False)
 @dataclass(frozen=True, repr=False)
 class HarmonicBasis:
     """Harmonics `0 .. harmonics` of the base frequency `omega / nu`.
@@ -60,13 +62,8 @@ class HarmonicBasis:
         If one of them is not a positive whole number.
     """
 
-    harmonics: int
-    nu: int = 1
-
-    def __post_init__(self) -> None:
-        for name, value in (("harmonics", self.harmonics), ("nu", self.nu)):
-            if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
-                raise InputError(f"{name} must be a whole number of at least 1, not {value!r}")
+    harmonics: Count
+    nu: Count = 1
 
     @property
     def size(self) -> int:

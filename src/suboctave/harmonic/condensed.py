@@ -28,6 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
+from suboctave.arguments import checked
 from suboctave.errors import ConvergenceError, InputError, shortened
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.elimination import ComplexModes, Stack, complex_modes
@@ -403,6 +404,7 @@ def linear_part_of(
     return Condensed(reduction, at, tuple(held))
 
 
+@checked
 def condense(
     system: System,
     omega: float | tuple[float, float],

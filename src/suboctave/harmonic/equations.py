@@ -15,6 +15,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from suboctave.arguments import checked
 from suboctave.errors import InputError
 from suboctave.harmonic.aft.channel import Group
 from suboctave.harmonic.aft.law import Member
@@ -76,6 +77,7 @@ def _groups_of(system: System, linear: LinearPart) -> tuple[list[Group], list[Gr
     return shared, own
 
 
+@checked(result=True, methods=False)
 class Equations:
     """Harmonic balance of a system in a basis, without a motion; parameters as in `evaluation.HarmonicBalance`."""
 

@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from suboctave.arguments import checked
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.aft.channel import Channel, Group, laws_along
 from suboctave.harmonic.aft.law import Along, LawAlong, LocalMotion
@@ -65,6 +66,7 @@ class HarmonicBalance(Equations):
         """The same equations in the basis of 2 H + 1 harmonics, which a motion is completed in."""
         return self.with_basis(HarmonicBasis(self.top, self.basis.nu))
 
+    @checked(result=True)
     def at(self, x: Array, omega: float, values: Mapping[str, float] | None = None) -> BalanceState:
         """Evaluate at coefficients x, frequency omega and, where given, other parameter values.
 
@@ -84,6 +86,7 @@ class HarmonicBalance(Equations):
         # the half-odd basis goes up to H + 1/2
         return linear.covering((basis.harmonics + 0.5) / basis.nu * abs(float(omega)))
 
+    @checked(result=True)
     def settle(self, x: Array, omega: float, values: Mapping[str, float] | None = None) -> HarmonicBalance:
         """These equations with sample counts chosen for a motion and frozen from here on."""
         if self.settled:

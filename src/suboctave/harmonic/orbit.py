@@ -9,6 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
+from suboctave.arguments import checked
 from suboctave.errors import GivenDof, InputError, chosen_dof, shortened
 from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis, harmonic_index, to_complex, to_real
 from suboctave.harmonic.energy import fed
@@ -24,6 +25,7 @@ from suboctave.model.system import System
 _REPEATED = 1e-6
 
 
+@checked(result=True)
 @dataclass(frozen=True, eq=False)
 class PeriodicOrbit:
     """One periodic motion of a system, solved by harmonic balance.

@@ -19,7 +19,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from suboctave.errors import InputError, check_numbers
+from suboctave.arguments import Count, Positive, checked
+from suboctave.errors import InputError
 from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.evaluation import BalanceState, length
 
@@ -33,6 +34,7 @@ _FINER = 1.05
 _AIM = 0.6
 
 
+@checked(methods=False)
 @dataclass(frozen=True)
 class AdaptiveHarmonics:
     """Harmonics chosen at every step so that the neglected part of the motion stays below a tolerance.
@@ -45,18 +47,17 @@ class AdaptiveHarmonics:
         Bounds on the highest harmonic of omega; at the maximum the estimate is stated and the curve goes on.
     """
 
-    tolerance: float = 1e-5
-    event_tolerance: float = 3e-7
-    minimum: int = 5
-    maximum: int = 127
+    tolerance: Positive = 1e-5
+    event_tolerance: Positive = 3e-7
+    minimum: Count = 5
+    maximum: Count = 127
 
     def __post_init__(self) -> None:
-        check_numbers(**vars(self))
-        if not (0.0 < self.event_tolerance <= self.tolerance < 0.1):
+        if not (self.event_tolerance <= self.tolerance < 0.1):
             raise InputError(
                 f"need 0 < event_tolerance <= tolerance < 0.1, got {self.event_tolerance:g} and {self.tolerance:g}"
             )
-        if not 1 <= self.minimum <= self.maximum <= _LADDER[-1]:
+        if not self.minimum <= self.maximum <= _LADDER[-1]:
             raise InputError(
                 f"need 1 <= minimum <= maximum <= {_LADDER[-1]} harmonics, got {self.minimum} and {self.maximum}"
             )

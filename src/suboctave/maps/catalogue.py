@@ -20,6 +20,7 @@ from suboctave.analysis.diagram import Followed, diagram_of, span_of
 from suboctave.analysis.options import SearchOptions, handed_on, settings_of
 from suboctave.analysis.subharmonics import Seeds, isolated_branches
 from suboctave.analysis.track import track
+from suboctave.arguments import checked
 from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.continuation import NewtonOptions
 from suboctave.curves.identity import gap_to, lies_on
@@ -72,6 +73,7 @@ class SearchRange(NamedTuple):
         return SearchRange(max(low, 0.5 * min([self.low, *inside])), max([self.high, *(p + margin for p in inside)]))
 
 
+@checked(result=True)
 class PlaneMap(Stored, Pictured):
     """What is known over a plane of two parameters."""
 

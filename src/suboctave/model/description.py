@@ -23,6 +23,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from suboctave.arguments import checked
 from suboctave.errors import InputError, located, shortened, suggest
 from suboctave.model.expressions.coefficients import Coefficient, restored
 from suboctave.model.updated import Updated
@@ -51,6 +52,8 @@ class Recorded:
 
     def __init_subclass__(cls, family: str = "", **more: Any) -> None:
         super().__init_subclass__(**more)
+        if cls.__module__.startswith(_PACKAGE):
+            checked(cls, methods=False)
         if family:
             cls.family = family
         _KNOWN[type_name(cls)] = cls

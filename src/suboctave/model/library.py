@@ -10,6 +10,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from suboctave.arguments import checked
 from suboctave.errors import InputError, is_number, shortened
 from suboctave.model.elements.base import BaseElement
 from suboctave.model.elements.coupled import Expression
@@ -43,6 +44,7 @@ def _forced(
     return System(*matrices, elements, [HarmonicLoad(dof=dof, amplitude=amplitude)], parameters, name)
 
 
+@checked
 def reference_oscillator(
     zeta: float = 0.03,
     alpha: float = 0.16,
@@ -67,6 +69,7 @@ def reference_oscillator(
     return _forced("reference oscillator", parameters, elements, (1.0, "2*zeta", 1.0), "p")
 
 
+@checked
 def reference_oscillator_physical(
     m: float,
     c: float,
@@ -94,6 +97,7 @@ def reference_oscillator_physical(
     return _forced("reference oscillator (physical)", parameters, elements, amplitude="force")
 
 
+@checked
 def nondimensional(
     m: float,
     c: float,
@@ -124,12 +128,14 @@ def nondimensional(
     }
 
 
+@checked
 def duffing(c: float = 0.05, k: float = 1.0, alpha: float = 1.0, F: float = 1.0, m: float = 1.0) -> System:
     """Duffing's oscillator, `m x'' + c x' + k x + alpha x^3 = F cos(omega t)`; softening if `alpha` is negative."""
     parameters = {"m": m, "c": c, "k": k, "alpha": alpha, "F": F}
     return _forced("Duffing oscillator", parameters, [CubicSpring(dof=0, coefficient="alpha")])
 
 
+@checked
 def mathieu_duffing(
     c: float = 0.05, k: float = 1.0, eps: float = 0.2, gamma: float = 0.3, F: float = 0.0, m: float = 1.0
 ) -> System:
@@ -144,6 +150,7 @@ def mathieu_duffing(
     return _forced("Mathieu-Duffing oscillator", parameters, elements)
 
 
+@checked
 def jeffcott_rotor(
     m: float = 1.0,
     c: float = 0.1,
@@ -172,6 +179,7 @@ def jeffcott_rotor(
     return System(mass, damping, stiffness, rubbing, [unbalance], parameters, "Jeffcott rotor", ("x", "y"))
 
 
+@checked
 def nltva(F: float = 0.11) -> System:
     """A Duffing oscillator with a nonlinear tuned vibration absorber (DOF 1), forced at DOF 0.
 
@@ -190,6 +198,7 @@ def nltva(F: float = 0.11) -> System:
     return _forced("nonlinear tuned vibration absorber", parameters, elements, matrices)
 
 
+@checked
 def two_mass_unilateral(
     F: float = 0.1, Kc: float = 100.0, gap: float = 1.0, damping: float = 0.03, regularization: float | None = None
 ) -> System:
@@ -210,6 +219,7 @@ def two_mass_unilateral(
     return _forced("two masses with a one-sided stop", parameters, elements, matrices, dof=1)
 
 
+@checked
 def chain_with_stop(
     masses: int = 10,
     Kc: float = 1.0,

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from suboctave.arguments import checked
 from suboctave.errors import InputError, Key, Refusals, is_number, located, printable, shortened, suggest
 from suboctave.model.angles import Angle, Turns, check_angles, numbered, read_angles
 from suboctave.model.description import Arrays, build_part, describe_part, from_plain, plain_value
@@ -31,6 +32,7 @@ _MATRICES = ("mass", "damping", "stiffness", "structural")
 _PARTS = (*_MATRICES, "elements", "loads", "parameters", "name", "dof_names", "units", "angles")
 
 
+@checked
 class System:
     """Mass, damping, stiffness, elements, loads and named parameters. Immutable.
 
@@ -68,8 +70,8 @@ class System:
         mass: Any,
         damping: Any,
         stiffness: Any,
-        elements: Iterable[BaseElement] = (),
-        loads: Iterable[Load] = (),
+        elements: BaseElement | Iterable[BaseElement] = (),
+        loads: Load | Iterable[Load] = (),
         parameters: Mapping[str, float] | None = None,
         name: str = "",
         dof_names: Iterable[str] = (),

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from suboctave.arguments import checked
 from suboctave.atomic import free_place, replace_file
 from suboctave.errors import InputError, shortened
 from suboctave.pictures import style
@@ -124,6 +125,7 @@ class Found:
         return [dataset for own in self.datasets.values() for dataset in own.values()]
 
 
+@checked
 def write_report(
     results: Mapping[str, Any],
     path: str | Path,

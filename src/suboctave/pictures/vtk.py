@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from suboctave.arguments import checked
 from suboctave.atomic import free_place, replace_file
 from suboctave.errors import InputError, shortened
 from suboctave.pictures.nodal import nodal_displacements
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from suboctave.structures.structure import Structure
 
 
+@checked
 def to_pyvista(structure: Structure, fields: Mapping[str, Any]) -> Any:
     """A `pyvista.UnstructuredGrid` of the mesh, with displacements (N, 3) of the nodes as point data.
 
@@ -32,6 +34,7 @@ def to_pyvista(structure: Structure, fields: Mapping[str, Any]) -> Any:
     return pyvista.from_meshio(_meshio_mesh(structure, fields))
 
 
+@checked
 def write_vtu(path: str | Path, structure: Structure, fields: Mapping[str, Any], overwrite: bool = False) -> Path:
     """Write the mesh with displacements of its nodes as a .vtu file, which ParaView reads.
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from suboctave.arguments import checked
 from suboctave.bifurcation.bifurcation import Bifurcation, BifurcationList, target_multiplier
 from suboctave.continuation.ending import Ending, interruption_of, sentence
 from suboctave.continuation.problem import Array
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
     from suboctave.results.sweep import SweepPath
 
 
+@checked(result=True)
 class CurveTables(Stored, Pictured):
     """One curve or several, as tables and as their files."""
 
@@ -79,6 +81,7 @@ def _over_points(path: str, meaning: str) -> Any:
     return column
 
 
+@checked(result=True)
 class Branch(CurveTables, BranchReadings):
     """A curve of periodic motions along one free parameter.
 
@@ -354,6 +357,7 @@ class Branch(CurveTables, BranchReadings):
 
 
 # ----------------------------------------------------------------------------------------------- curves of bifurcations
+@checked(result=True)
 class TrackedBranch(Branch):
     """Bifurcations of one kind in two parameters, or motions singled out otherwise, in order; read like a `Branch`.
 

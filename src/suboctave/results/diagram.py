@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from suboctave.arguments import checked
 from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.curves.junction import period_name
 from suboctave.errors import InputError
@@ -100,6 +101,7 @@ class DiagramBranch:
         return f"<branch {self.number}: {self.label}, {len(self.branch)} points, {count} branches leave it>"
 
 
+@checked(result=True)
 class BifurcationDiagram(CurveTables):
     """A response and the branches that bifurcate from it, as a tree; print it to see all of it.
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from suboctave.arguments import checked
 from suboctave.curves.hopf import stilled
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.model.linearised import ALL_EIGENVALUES, eigenvalues
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     import pandas
 
 
+@checked(result=True)
 class Equilibria(Branch):
     """A curve of equilibria along one parameter, in order; read like a `Branch`.
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from suboctave.arguments import checked
 from suboctave.curves.trace import BranchPoint
 from suboctave.errors import InputError, shortened
 from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis, to_real
@@ -25,6 +26,7 @@ ON_CIRCLE = 1e-4
 _CRITICAL = {"LP": (1.0,), "BP": (1.0,), "PD": (-1.0,)}
 
 
+@checked(result=True)
 class ModeCurve(TrackedBranch):
     """A nonlinear mode over its energy; read like a `Branch` over omega, `amplitude` is that of the observed DOF.
 

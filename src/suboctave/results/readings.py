@@ -30,6 +30,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from suboctave.arguments import checked
 from suboctave.bifurcation.gaps import contact_side, levels
 from suboctave.errors import GivenDof, InputError, chosen_dof, shortened, suggest
 from suboctave.harmonic.basis import Array, ComplexArray, harmonic_index, to_complex
@@ -56,6 +57,7 @@ def _of_a_dof(what: str, meaning: str) -> Callable[..., Array]:
     return read
 
 
+@checked(result=True)
 class BranchReadings:
     """What is read off a branch, each an array (len,) over its points. DOFs default to the observed one."""
 

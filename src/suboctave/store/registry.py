@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from suboctave.arguments import checked
 from suboctave.atomic import free_place
 from suboctave.errors import InputError
 from suboctave.harmonic.linear_part import LinearPart
@@ -91,6 +92,7 @@ def parts_of(groups: Datasets, names: Iterable[str], whole: str) -> dict[str, xa
     return {name: groups[name] for name in wanted}
 
 
+@checked(result=True)
 class Stored:
     """A result that has a codec."""
 

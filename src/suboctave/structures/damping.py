@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from suboctave.arguments import checked
 from suboctave.errors import InputError, is_number, shortened
 from suboctave.model.expressions.coefficients import Coefficient, Number, named_coefficient
 from suboctave.model.inputs import check_count
@@ -51,6 +52,7 @@ def written_out(matrix: Any) -> Any:
     return scipy.sparse.csr_array(matrix.toarray())
 
 
+@checked
 @dataclass(frozen=True)
 class Rayleigh:
     """Damping `alpha M + beta K`. Numbers, or expressions in the parameters of the system.
@@ -109,6 +111,7 @@ class Rayleigh:
         return {alpha.text: mass, beta.text: stiffness}
 
 
+@checked
 @dataclass(frozen=True)
 class ModalDamping:
     """Damping ratios of the modes, the lowest first.

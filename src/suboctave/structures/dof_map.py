@@ -18,6 +18,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from suboctave.arguments import checked
 from suboctave.errors import InputError, shortened, suggest
 from suboctave.model.elements.base import Array
 from suboctave.model.loads import DIRECTIONS
@@ -76,6 +77,7 @@ def direction_label(given: Any) -> str:
     return _OTHER_NAMES.get(text, text)
 
 
+@checked
 @dataclass(frozen=True, eq=False)
 class DofMap:
     """The labels `(node, direction)` of the degrees of freedom, in the order of the matrices. Immutable.

@@ -15,6 +15,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, TypeAlias
 
+from suboctave.arguments import checked
 from suboctave.errors import InputError, damage, located, path_of, shortened, suggest
 from suboctave.structures import (
     abaqus,
@@ -58,6 +59,7 @@ ENDINGS = tuple(_READERS)
 _BEGINNING = 1024
 
 
+@checked
 def read_structure(
     path: FileName | None = None,
     stiffness: FileName | None = None,

@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from suboctave.arguments import checked
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.model.elements.base import Array
 from suboctave.model.matrices import sparse_factors
@@ -36,6 +37,7 @@ _BACKWARD = 1e-12
 _FAR = 1e-3
 
 
+@checked(result=True)
 @dataclass(frozen=True, eq=False)
 class NaturalFrequencies:
     """The lowest natural frequencies of the undamped structure, in ascending order.

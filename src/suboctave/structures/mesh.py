@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from suboctave.arguments import checked
 from suboctave.errors import InputError, is_number, shortened
 from suboctave.model.elements.base import Array
 from suboctave.structures.dof_map import Node, node_label
 
 
+@checked
 @dataclass(frozen=True, eq=False)
 class Mesh:
     """Points, cells and labels of nodes. Immutable.

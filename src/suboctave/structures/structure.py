@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from suboctave.arguments import checked
 from suboctave.errors import InputError, located, path_of, printable, shortened
 from suboctave.model.elements.base import Array, BaseElement
 from suboctave.model.expressions.coefficients import Coefficient, named_coefficient
@@ -24,6 +25,7 @@ from suboctave.structures.mesh import Mesh
 from suboctave.structures.numpy_files import write
 
 
+@checked
 @dataclass(frozen=True, eq=False, repr=False)
 class Structure:
     """Matrices of a structure with what its degrees of freedom are called. Immutable.

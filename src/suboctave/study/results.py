@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from suboctave.arguments import checked
 from suboctave.atomic import free_place
 from suboctave.errors import InputError, suggest
 from suboctave.experiments.common import TimeResult
@@ -31,6 +32,7 @@ Result = Branch | BifurcationDiagram | Isolas | Table
 Saved = Result | TimeResult | BranchVerification | IsolaMap | RegimeMap | Sweep
 
 
+@checked(result=True)
 @dataclass(frozen=True, eq=False)
 class Results(Mapping[str, Result]):
     """The results of a study by the names of its analyses, in their order.
@@ -107,6 +109,7 @@ def _summary(item: Result) -> str:
     return f"{len(item)} {what}, {len(item.bifurcations)} bifurcations"
 
 
+@checked
 def load(path: str | Path, *, allow_code: bool = False, linear: LinearPart | None = None) -> Saved | Results:
     """Read a results file: what was saved there, a branch, diagram, map, sweep, ..., or the `Results` of a study.
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from suboctave.arguments import checked
 from suboctave.bifurcation.bifurcation import CONTACT_KINDS, Bifurcation, TrackedEvent
 from suboctave.continuation.problem import Array
 from suboctave.curves.trace import BranchPoint
@@ -38,6 +39,7 @@ _DIGITS = 1e-12
 _AT_ONCE = 10_000_000
 
 
+@checked(result=True)
 @dataclass(frozen=True, eq=False)
 class Verification:
     """A harmonic-balance motion held against shooting.

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from suboctave.arguments import checked
 from suboctave.continuation.problem import Array
 from suboctave.experiments.common import TimeResult
 from suboctave.harmonic.basis import ComplexArray
@@ -118,6 +119,7 @@ POINT_COLUMNS, EVENT_COLUMNS = (
 VERDICTS = ("stable", "computed")
 
 
+@checked(result=True)
 @dataclass(frozen=True, eq=False, repr=False)
 class BranchVerification(TimeResult):
     """What shooting says of a branch.

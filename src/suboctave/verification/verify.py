@@ -17,6 +17,7 @@ from typing import Any, overload
 
 import numpy as np
 
+from suboctave.arguments import Count, Positive, Progress, Share, checked
 from suboctave.bifurcation.bifurcation import CONTACT_KINDS, Bifurcation
 from suboctave.continuation.linear import one_thread
 from suboctave.curves.trace import BranchPoint
@@ -50,6 +51,7 @@ from suboctave.verification.result import (
 from suboctave.verification.shots import Shot, Shots
 
 
+@checked
 def stability(
     orbit: PeriodicOrbit | BranchPoint | Bifurcation, method: StabilityMethod | str | None = None
 ) -> FloquetResult:
@@ -117,8 +119,6 @@ def _verify_branch(
 
 def _chosen(count: int, points: int | Iterable[int] | None, every: int) -> list[int]:
     """Indices of the points that are looked at."""
-    if isinstance(every, bool) or not isinstance(every, int | np.integer) or every < 1:
-        raise InputError(f"every must be a positive whole number, not {every!r}")
     if points is None:
         return list(range(0, count, int(every)))
     if every != 1:
@@ -231,12 +231,12 @@ def _confirmed(item: Bifurcation, shot: Shot | None, tolerance: float, observe: 
 
 @overload
 def verify(
-    what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: float = 1e-3, *, seconds: float | None = None
+    what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: Share = 1e-3, *, seconds: float | None = None
 ) -> Verification: ...
 @overload
 def verify(
     what: Branch,
-    tolerance: float = 1e-3,
+    tolerance: Share = 1e-3,
     *,
     points: int | Iterable[int] | None = None,
     every: int = 1,
@@ -245,17 +245,18 @@ def verify(
     progress: Any = None,
     seconds: float | None = None,
 ) -> BranchVerification: ...
+@checked
 @limited
 def verify(
     what: PeriodicOrbit | BranchPoint | Bifurcation | Branch,
-    tolerance: float = 1e-3,
+    tolerance: Share = 1e-3,
     *,
     points: int | Iterable[int] | None = None,
-    every: int = 1,
+    every: Count = 1,
     bifurcations: bool = True,
-    workers: int | None = None,
-    progress: Any = None,
-    seconds: float | None = None,
+    workers: Count | None = None,
+    progress: Progress = None,
+    seconds: Positive | None = None,
 ) -> Verification | BranchVerification:
     """Contradict a motion, a located bifurcation, or all of a branch, by shooting from the states at t = 0.
 
@@ -292,10 +293,10 @@ def verify(
     A bifurcation is looked for within a hundred tolerances along the curve of true motions, and given up after 120
     passes through the motion with its tangent flow: `reason` says so.
     """
-    if not (isinstance(tolerance, (int, float)) and 0.0 < tolerance < 1.0):
-        raise InputError(f"tolerance must be a number between 0 and 1, not {tolerance!r}")
     if isinstance(what, Branch):
         return _verify_branch(what, tolerance, points, every, bifurcations, workers, progress)
     if points is not None or every != 1:
         raise InputError("points= and every= choose among the points of a branch; this is a single motion")
+    if not bifurcations or workers is not None or progress:
+        raise InputError("bifurcations=, workers= and progress= are those of a branch; this is a single motion")
     return verify_motion(what, tolerance)

@@ -15,6 +15,7 @@ from abc import ABC
 from dataclasses import dataclass
 from typing import ClassVar
 
+from suboctave.arguments import checked
 from suboctave.curves.augmentation import Augmentation
 from suboctave.curves.events.alcorta import locate_doubling
 from suboctave.curves.events.locate import Guess, Singular, locate_singular
@@ -48,6 +49,7 @@ class Formulation(ABC):
         return locate_singular(guess, kind, self.operator(kind))
 
 
+@checked(methods=False)
 @dataclass(frozen=True)
 class BorderedSystem(Formulation):
     """The minimally augmented system `[R; g]`, g a bordered scalar that vanishes where J_kappa is singular."""
@@ -55,6 +57,7 @@ class BorderedSystem(Formulation):
     name: ClassVar[str] = "bordered"
 
 
+@checked(methods=False)
 @dataclass(frozen=True)
 class ExtendedSystem(Formulation):
     """The extended system `[R; J_kappa phi; phi^H phi - 1]`."""
@@ -65,6 +68,7 @@ class ExtendedSystem(Formulation):
         return ExtendedOperator
 
 
+@checked(methods=False)
 @dataclass(frozen=True)
 class Alcorta2019(Formulation):
     """The formulation of Alcorta et al., Nonlinear Dynamics 98 (2019): its period-doubling system and test functions.

@@ -23,6 +23,7 @@ import numpy as np
 
 from suboctave.analysis.options import SearchOptions
 from suboctave.analysis.track import track
+from suboctave.arguments import checked
 from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.continuation.problem import Array
 from suboctave.curves.identity import lies_on
@@ -46,6 +47,7 @@ _PROBED = (0.1, 0.5, 0.9)
 _AGREES = 1e-3
 
 
+@checked
 @timed
 def isola_map(
     isolas: Isola | Isolas | Sequence[Isola],
@@ -362,6 +364,7 @@ class IsolaRegion:
         return [(natures[a], values[a : b + 1], where[a : b + 1]) for a, b in pairwise(cuts)]
 
 
+@checked(result=True)
 @dataclass(eq=False, repr=False)
 class IsolaMap(PlaneMap):
     """In which regions of two design parameters isolas exist.

@@ -19,6 +19,7 @@ import numpy as np
 
 from suboctave.analysis.locate_extremum import locate_extremum
 from suboctave.analysis.sensitivity import foretold, sensitivity
+from suboctave.arguments import checked
 from suboctave.bifurcation.bifurcation import TrackedEvent
 from suboctave.continuation.linear import length
 from suboctave.errors import ConvergenceError, InputError, is_number, shortened, suggest
@@ -31,6 +32,7 @@ _ITERATIONS, _CLOSE = 50, 1e-9
 _LONGEST, _SHORTEST = 0.5, 1e-3
 
 
+@checked(result=True)
 @dataclass(frozen=True, repr=False)
 class DesignMargin:
     """The nearest design without an isola.
@@ -67,6 +69,7 @@ class DesignMargin:
         return "\n".join(lines)
 
 
+@checked
 @limited
 def design_margin(
     isola: Isola,

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 
 from suboctave.analysis.options import SearchOptions
+from suboctave.arguments import checked
 from suboctave.bifurcation.bifurcation import TrackedEvent
 from suboctave.continuation.ending import Ending, EndReason
 from suboctave.curves.junction import period_name
@@ -61,6 +62,7 @@ class IsolaEnd(TrackedEvent, float):
         return f"{self.kind} at {self.parameter_name} = {float(self):.9g}, omega = {self.omega:.9g}"
 
 
+@checked(result=True)
 @dataclass(eq=False, repr=False)
 class Isola:
     """A closed branch that no other branch leads to, over a range of a design parameter.
@@ -238,6 +240,7 @@ def _joined(chain: Sequence[MonotonePiece], bounds: tuple[float, float]) -> Trac
     return TrackedBranch(curve.kind, curve.names, curve.system, curve.name, *own)
 
 
+@checked(result=True)
 @dataclass(eq=False, repr=False)
 class Isolas(Stored, Pictured, Sequence[Isola]):
     """Isolas in the order of the values at which they are born, and what was learnt on the way.

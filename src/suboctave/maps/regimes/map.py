@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from suboctave.analysis.subharmonics import periodic_orbit
+from suboctave.arguments import checked
 from suboctave.continuation.linear import one_thread
 from suboctave.continuation.problem import Array
 from suboctave.curves.identity import apart
@@ -57,6 +58,7 @@ class Region:
     values: tuple[float, float]
 
 
+@checked(result=True)
 class RegimeMap(PlaneMap):
     """Which stable motions exist over omega and a design parameter.
 
@@ -345,6 +347,7 @@ class Landing:
     state: Array
 
 
+@checked(result=True)
 @dataclass(eq=False, repr=False)
 class RegimeCheck:
     """What time integration says of a regime map.

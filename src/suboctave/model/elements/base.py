@@ -15,11 +15,12 @@ import inspect
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from numbers import Integral
-from typing import Any, TypeAlias
+from typing import Annotated, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from suboctave.arguments import READ
 from suboctave.errors import InputError, located, shortened
 from suboctave.interruption import users_function
 from suboctave.model.description import Recorded
@@ -28,7 +29,7 @@ from suboctave.model.elements.smoothness import Sampling, WholeLaw, widths_of
 from suboctave.model.expressions.coefficients import Coefficient, Number, named_coefficient
 
 Array: TypeAlias = NDArray[np.float64]
-Dof: TypeAlias = int | Sequence[int]
+Dof: TypeAlias = Annotated[int | Sequence[int], READ]
 
 
 def numbers_of(given: Any) -> Array:

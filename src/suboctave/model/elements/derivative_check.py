@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from suboctave.arguments import checked
 from suboctave.errors import InputError, check_numbers, shortened
 from suboctave.model.elements.base import STEP, Array, BaseElement, Element, central_difference, shifted, step_of
 from suboctave.model.elements.coupled import as_coupled
@@ -51,6 +52,7 @@ class DerivativeReport:
     __repr__ = __str__
 
 
+@checked
 def check_derivatives(
     element: BaseElement,
     parameters: Mapping[str, float] | None = None,

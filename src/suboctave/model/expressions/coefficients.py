@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import numbers
 from collections.abc import Iterable, Mapping
-from typing import Any, TypeAlias
+from typing import Annotated, Any, TypeAlias
 
+from suboctave.arguments import READ
 from suboctave.errors import InputError, is_number, located, shortened, suggest
 from suboctave.model.expressions.reader import FUNCTIONS, Form, number_form, read
 
@@ -80,7 +81,7 @@ class Coefficient:
         return restored, (self.text, self.by)
 
 
-Number: TypeAlias = float | str | Coefficient
+Number: TypeAlias = Annotated[float | str | Coefficient, READ]
 
 
 def restored(text: str, by: Iterable[str] = ()) -> Coefficient:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from suboctave.arguments import checked
 from suboctave.errors import InputError, suggest
 from suboctave.harmonic.linear_part import LinearPart
 from suboctave.interruption import Interruption
@@ -40,6 +41,7 @@ class Computed:
     seconds: float = float("nan")
 
 
+@checked(result=True)
 @dataclass(eq=False, repr=False)
 class Sweep(Stored):
     """A study at many values of its parameters.
