@@ -23,6 +23,7 @@ import os
 import sys
 import types
 import typing
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Annotated, Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origin
 
@@ -37,6 +38,13 @@ _PACKAGE = "suboctave."
 _LARGEST = 2**63 - 1
 #: the largest count of anything
 _MOST = 100_000_000
+
+
+#: arguments by the letters of the field that some write for them, in small letters
+_SYMBOLS = {
+    "m": ("mass",), "c": ("damping", "coefficient"), "k": ("stiffness", "coefficient"), "f": ("force", "amplitude"),
+    "p": ("amplitude", "force"), "w": ("omega",), "mu": ("force",), "g": ("gap", "acceleration"),
+}  # fmt: skip
 
 
 class Rule(NamedTuple):
@@ -65,13 +73,13 @@ Progress = Callable[[float, str], Any] | bool | None
 class Unfit(Exception):
     """A value that does not fit: what it must be, itself, and its place in the argument."""
 
-    def __init__(self, words: str, value: Any, place: tuple[Any, ...] = ()) -> None:
+    def __init__(self, words: str, value: Any, place: tuple[Any, ...] = (), hint: str = "") -> None:
         super().__init__()
-        self.words, self.value, self.place = words, value, place
+        self.words, self.value, self.place, self.hint = words, value, place, hint
 
     def at(self, key: Any) -> Unfit:
         """The same of a part."""
-        return Unfit(self.words, self.value, (key, *self.place))
+        return Unfit(self.words, self.value, (key, *self.place), self.hint)
 
 
 class Reading(NamedTuple):
@@ -118,10 +126,12 @@ def _is_text(value: Any) -> bool:
 
 
 def _whole(value: Any) -> Any:
-    if isinstance(value, numbers.Integral) and not isinstance(value, bool) and abs(value) <= _LARGEST:
-        return value
-    if _is_finite(value) and float(value).is_integer() and abs(value) <= _LARGEST:
-        return int(value)
+    if isinstance(value, int | np.integer) and not isinstance(value, bool):
+        if -_LARGEST <= value <= _LARGEST:
+            return value
+        raise Unfit(f"a whole number of at most {len(str(_LARGEST)) - 1} digits", value)
+    if _is_finite(value) and float(value).is_integer():
+        return _whole(int(value))
     raise Unfit("a whole number", value)
 
 
@@ -129,19 +139,38 @@ def _is_file_name(value: Any) -> bool:
     return isinstance(value, str | os.PathLike) and isinstance(os.fspath(value), str)
 
 
-def _is_array(value: Any, kinds: str = "iufc") -> bool:
+def _array_of(value: Any) -> Any:
+    """What NumPy makes of a value; None where that is not possible, or one object."""
+    if isinstance(value, set | frozenset | Mapping | bytes) or hasattr(value, "data_vars"):
+        return None
     try:
-        return np.asarray(value).dtype.kind in kinds
-    except (TypeError, ValueError, OverflowError):
-        return False
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return np.asarray(value)
+    except Exception:  # ragged lists, numbers of hundreds of digits, what other packages raise
+        return None
 
 
-def _array(value: Any) -> Any:
-    if isinstance(value, np.ndarray) and value.dtype.kind in "biufc":
-        return value
-    if isinstance(value, set | frozenset | Mapping | str | bytes) or not _is_array(value):
-        raise Unfit("an array of numbers", value)
-    return np.asarray(value)
+def _array(words: str, allowed: str) -> Reading:
+    """Arrays whose entries are of these kinds of NumPy, and lists that become such."""
+
+    def read(value: Any) -> Any:
+        array = value if isinstance(value, np.ndarray) else _array_of(value)
+        if array is None or array.dtype.kind not in allowed or (array.ndim == 0 and array is not value):
+            raise Unfit(words, value)
+        return array
+
+    return Reading(words, words.replace("an array", "arrays"), read)
+
+
+def _is_array_like(value: Any) -> bool:
+    """Whether NumPy makes something else than an object of it."""
+    array = _array_of(value)
+    return (
+        isinstance(value, str | Mapping)
+        or hasattr(value, "toarray")
+        or (array is not None and array.dtype.kind in "biufcU")
+    )
 
 
 _ANYTHING = Reading("anything", "anything", _anything)
@@ -153,10 +182,14 @@ _NUMBER = _reading("a number", _is_real)
 _COMPLEX = _reading("a number", lambda v: isinstance(v, numbers.Complex) and not isinstance(v, bool))
 _TEXT = _reading("a text", _is_text)
 _FILE = _reading("the name of a file", _is_file_name, "names of files")
-_ARRAY = Reading("an array of numbers", "arrays of numbers", _array)
+_ARRAY = _array("an array of numbers", "biufc")
+_OBJECTS = _array("an array", "biufcUO")
+_LIKE = _reading("an array of numbers", _is_array_like, "arrays of numbers")
+#: kinds of NumPy from which those of an array that is asked for can be made
+_KINDS = {"f": "biuf", "c": "biufc", "i": "iu", "u": "iu", "b": "b"}
 _SINGLE = {
     Any: _ANYTHING, object: _ANYTHING, None: _NONE, type(None): _NONE, bool: _TRUTH, int: _WHOLE, complex: _COMPLEX,
-    str: _TEXT, np.ndarray: _ARRAY, ArrayLike: _ANYTHING, inspect.Parameter.empty: _ANYTHING,
+    str: _TEXT, np.ndarray: _OBJECTS, ArrayLike: _LIKE, inspect.Parameter.empty: _ANYTHING,
 }  # fmt: skip
 
 
@@ -196,7 +229,13 @@ def _function(arguments: Any) -> Reading:
 
 def _literal(values: tuple[Any, ...]) -> Reading:
     words = " or ".join(map(repr, values))
-    return _reading(words, lambda value: type(value) in (str, int, bool) and value in values, words)
+
+    def read(value: Any) -> Any:
+        if type(value) in (str, int, bool) and value in values:
+            return value
+        raise Unfit(words, value, hint=suggest(value, map(str, values)) if isinstance(value, str) else "")
+
+    return Reading(words, words, read)
 
 
 # --------------------------------------------------------------------------------------------------------- containers
@@ -220,7 +259,7 @@ def _items(value: Any, readings: Iterator[Reading]) -> Any:
             raise unfit.at(i) from None
         changed |= used is not item
         read.append(used)
-    return tuple(read) if changed and not isinstance(value, np.ndarray) else value
+    return value if isinstance(value, np.ndarray) or (not changed and isinstance(value, list | tuple)) else tuple(read)
 
 
 def _sequence(item: Reading) -> Reading:
@@ -335,7 +374,9 @@ def reading_of(annotation: Any, finite: bool = True) -> Reading:
         return _with_rules(inner, rules) if rules else inner
     if origin in (Union, types.UnionType) or isinstance(annotation, _AbsentUnion):
         return _reading_of_union(list(arguments or annotation.parts), finite)
-    if annotation == ArrayLike or annotation is inspect.Parameter.empty or isinstance(annotation, TypeVar | str):
+    if annotation == ArrayLike:
+        return _LIKE
+    if annotation is inspect.Parameter.empty or isinstance(annotation, TypeVar | str):
         return _ANYTHING
     if origin is None:
         return _single(annotation)
@@ -344,7 +385,7 @@ def reading_of(annotation: Any, finite: bool = True) -> Reading:
 
 def _reading_of_union(members: list[Any], finite: bool) -> Reading:
     if set(get_args(ArrayLike)) <= set(members):
-        return _ANYTHING
+        return _union([_LIKE, *([_NONE] if type(None) in members else [])])
     if any(isinstance(one, type) and issubclass(one, os.PathLike) for one in members):
         members = [one for one in members if one is not str]
     if float in members:
@@ -377,7 +418,8 @@ def _container(origin: Any, arguments: tuple[Any, ...], finite: bool) -> Reading
     if origin is Literal:
         return _literal(arguments)
     if origin is np.ndarray:
-        return _ARRAY
+        kinds = [np.dtype(one).kind for part in arguments for one in get_args(part) if isinstance(one, type)]
+        return _array("an array of numbers", _KINDS.get(kinds[0], "biufc")) if kinds else _ARRAY
     if origin is tuple and arguments[-1:] != (...,):
         return _fixed([reading_of(one, finite) for one in arguments])
     if origin is collections.abc.Callable:
@@ -485,7 +527,8 @@ class _Table:
             reading = None if name in self.unnamed else self.readings.get(name)
             if reading is None and self.more is None:
                 known = self.readings.keys() - self.unnamed
-                tail = suggest(name, known, limit=len(known))
+                meant = [word for word in _SYMBOLS.get(name.lower(), ()) if word in known]
+                tail = suggest(meant[0] if meant else name, known, limit=len(known))
                 raise TypeError(f"{self.name}() got an unexpected keyword argument {name!r}{tail}")
             used[name] = self.read(name, reading or self.more or _ANYTHING, value)
         return used
@@ -499,7 +542,9 @@ class _Table:
         except Unfit as unfit:
             where = name + "".join(f"[{shortened(key)}]" for key in unfit.place)
             key = (name, *(part for part in unfit.place if isinstance(part, str | int)))
-            raise InputError(f"{self.prefix}{where} must be {unfit.words}, not {shortened(unfit.value)}", key) from None
+            raise InputError(
+                f"{self.prefix}{where} must be {unfit.words}, not {shortened(unfit.value)}{unfit.hint}", key
+            ) from None
 
 
 def _refuse_masked(value: Any) -> None:

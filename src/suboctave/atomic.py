@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -34,9 +35,22 @@ def free_place(path: str | Path, overwrite: bool = False, suffixes: tuple[str, .
     return target
 
 
+def _cannot_write(target: Path, error: OSError) -> OSError:
+    """The same failure by the name of the file that was asked for: a disk is full, a name is too long, ..."""
+    number = error.errno
+    if number is None and (stated := re.search(r"errno = (\d+)", str(error))):  # as the HDF5 library says it
+        number = int(stated[1])
+    if number is not None:
+        return OSError(number, f"cannot write it: {os.strerror(number)}", str(target))
+    return OSError(f"cannot write {target}: {' '.join(str(error).split())}")
+
+
 def replace_file(target: Path, make: Callable[[Path], Any]) -> None:
     """Have `make(path)` write a file beside `target`, sync it to the disk and rename it: all of it, or nothing."""
-    handle, name = tempfile.mkstemp(prefix=f".{target.name}-", suffix=".part", dir=target.parent)
+    try:
+        handle, name = tempfile.mkstemp(prefix=f".{target.name}-", suffix=".part", dir=target.parent)
+    except OSError as error:
+        raise _cannot_write(target, error) from error
     os.close(handle)
     try:
         make(Path(name))
@@ -46,8 +60,10 @@ def replace_file(target: Path, make: Callable[[Path], Any]) -> None:
         os.umask(mask)
         os.chmod(name, 0o666 & ~mask)
         os.replace(name, target)
-    except BaseException:
+    except BaseException as error:
         Path(name).unlink(missing_ok=True)
+        if isinstance(error, OSError):
+            raise _cannot_write(target, error) from error
         raise
     if os.name == "posix":
         handle = os.open(target.parent, os.O_RDONLY)

@@ -180,6 +180,10 @@ def damage(error: Exception, most: int = 120) -> str:
     return f"{type(error).__name__}: {'it holds no arrays of numbers' if 'pickle' in said else said}"
 
 
+#: names that begin like an unknown one, up to which they are what it may stand for
+_FEW = 3
+
+
 def suggest(name: str, known: Iterable[str], limit: int = 12) -> str:
     """The tail of a message on an unknown name: the closest known names, or else all of them (at most `limit`).
 
@@ -190,6 +194,9 @@ def suggest(name: str, known: Iterable[str], limit: int = 12) -> str:
         return ""
     lower = {candidate.lower(): candidate for candidate in names}
     close = difflib.get_close_matches(str(name).lower(), list(lower), n=3, cutoff=0.6)
+    if not close and name:  # an abbreviation of few
+        begun = [candidate for candidate in lower if candidate.startswith(str(name).lower())]
+        close = begun if len(begun) <= _FEW else []
     if close:
         return f" (did you mean {' or '.join(repr(lower[match]) for match in close)}?)"
     listed = ", ".join(names[:limit]) + (", ..." if len(names) > limit else "")

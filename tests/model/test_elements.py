@@ -232,7 +232,7 @@ def test_strided_input_gives_the_same_force():
         (lambda: CubicSpring(3, 1.0).direction(2), "DOFs 0 to 1"),
         (lambda: CubicSpring(coefficient=1.0, direction=[1.0, 0.0]).direction(3), "2 entries, the structure 3"),
         (lambda: PolynomialSpring(0, {0: 1.0}), "static="),
-        (lambda: PolynomialSpring(0, {1.5: 1.0}), "positive integer"),
+        (lambda: PolynomialSpring(0, {1.5: 1.0}), "must be a whole number, not 1.5"),
         (lambda: PolynomialSpring(0, {-1: 1.0}), "positive integer"),
         (lambda: PolynomialSpring(0, [0.0, 0.0]), "every coefficient is zero"),
         (lambda: PolynomialSpring(0, 3.0), "or a list"),

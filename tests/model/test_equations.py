@@ -143,7 +143,7 @@ REFUSED = [
     ("x'' + x = 0", {"x": 1.0}, "both a parameter and a degree of freedom"),
     ("sin'' + x = 0", {}, "cannot name a degree of freedom"),
     ([], {}, "must be a text or a sequence"),
-    ([3], {}, "must be a text or a sequence"),
+    ([3], {}, r"equations\[0\] must be a text, not 3"),
 ]
 
 

@@ -86,7 +86,7 @@ def test_unbalance_response_of_a_rotor():
     ("make", "part"),
     [
         (lambda: so.RotatingUnbalance(0), "needs mass_eccentricity"),
-        (lambda: so.RotatingUnbalance((0, 1), 1.0), "two different DOFs"),
+        (lambda: so.RotatingUnbalance((0, 1), 1.0), r"dof must be a whole number, not \(0, 1\)"),
         (lambda: so.RotatingUnbalance(0, 1.0, 0), "two different DOFs"),
         (lambda: so.RotatingUnbalance(0, 1.0, harmonic=0), "integer from 1 on"),
         (lambda: so.BaseDisplacement(), "needs amplitude"),

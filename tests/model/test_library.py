@@ -94,7 +94,7 @@ def test_the_chain_has_the_frequencies_of_the_closed_form(masses):
     exact = 2.0 * np.sin((2.0 * np.arange(1, masses + 1) - 1.0) * np.pi / (4 * masses + 2))
     np.testing.assert_allclose(np.sqrt(np.linalg.eigvalsh(stiffness)), exact, rtol=1e-12)
     np.testing.assert_allclose(damping, 0.03 * mass + 0.2 * stiffness, atol=1e-15)
-    with pytest.raises(InputError, match=r"masses=2\.5"):
+    with pytest.raises(InputError, match=r"masses must be a whole number, not 2\.5"):
         library.chain_with_stop(2.5)
 
 

@@ -42,7 +42,7 @@ def test_a_force_without_a_name_is_written_out():
         ("mm, s", "no unit of force or mass"),
         ("mm, cm, N, s", "both units of length"),
         ("mm, Nn, s", "did you mean"),
-        (7, "units are a text"),
+        (7, "units must be a text, not 7"),
     ],
 )
 def test_sets_that_do_not_hold_together_are_refused(given, words):

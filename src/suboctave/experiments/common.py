@@ -28,7 +28,7 @@ from typing import (
 import numpy as np
 from numpy.typing import NDArray
 
-from suboctave.arguments import checked
+from suboctave.arguments import Count, Positive, checked
 from suboctave.errors import InputError, is_number, shortened, suggest
 from suboctave.model.elements.base import Array, numbers_of
 from suboctave.model.elements.coupled import as_coupled
@@ -81,19 +81,19 @@ class TimeOptions(RunOptions, total=False):
 class ParallelOptions(TimeOptions, total=False):
     """Options of verbs that follow trajectories side by side."""
 
-    workers: Annotated[int | None, "Threads; default as many as there are processors. Results do not depend on it."]
+    workers: Annotated[Count | None, "Threads; default as many as there are processors. Results do not depend on it."]
 
 
 class RecognitionOptions(TimeOptions, total=False):
     """How finely a motion is integrated, and how its period is recognised."""
 
     tolerance: Annotated[
-        float | None,
+        Positive | None,
         "Local error relative to the size of the motion (default 1e-10, of `basins` 1e-8); of Newmark's method that of "
         "the equations solved in each step.",
     ]
     period_tolerance: Annotated[
-        float | None,
+        Positive | None,
         "Motions whose points repeat to this share of their size (default 1e-6) are periodic; at least three "
         "repetitions are needed.",
     ]
@@ -115,7 +115,7 @@ class SectionOptions(BasinOptions, total=False):
         '"accurate" (default): Dormand and Prince of order 8 with steps of its own, corners of laws located; or '
         '"newmark": fixed steps, as in `integrate`.',
     ]
-    steps_per_period: Annotated[int | None, "Steps of Newmark's method in one period (default 1000)."]
+    steps_per_period: Annotated[Count | None, "Steps of Newmark's method in one period (default 1000)."]
 
 
 @dataclass(frozen=True)

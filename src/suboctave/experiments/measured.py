@@ -6,14 +6,20 @@ import csv
 import math
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
-from suboctave.arguments import checked
+from suboctave.arguments import Rule, checked
 from suboctave.errors import InputError, is_number, path_of, printable, suggest
 from suboctave.model.elements.base import Array
 
 _UNITS = {"rad/s": 1.0, "Hz": 2.0 * math.pi}
+
+
+Column = Annotated[
+    Array, Rule("a list of finite numbers", lambda column: column.ndim == 1 and bool(np.isfinite(column).all()))
+]
 
 
 @checked(result=True)
@@ -21,8 +27,8 @@ _UNITS = {"rad/s": 1.0, "Hz": 2.0 * math.pi}
 class Measured:
     """Measured amplitudes of the fundamental, in the model's units: `omega` (N,) and `amplitude` (N,)."""
 
-    omega: Array
-    amplitude: Array
+    omega: Column
+    amplitude: Column
     label: str
 
     def __len__(self) -> int:

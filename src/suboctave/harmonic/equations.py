@@ -89,6 +89,8 @@ class Equations:
         linear: LinearPart | None = None,
         samples: tuple[int | None, ...] | None = None,
     ) -> None:
+        if samples is not None and len(samples) != len(system.elements):
+            raise InputError(f"samples must be {len(system.elements)} counts, one for each element, not {len(samples)}")
         self.system = system
         self.values: Mapping[str, float] = dict(system.parameters if values is None else values)
         self.linear: LinearPart = StructuralMatrices(system, self.values) if linear is None else linear

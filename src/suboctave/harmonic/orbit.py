@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from suboctave.arguments import checked
+from suboctave.arguments import Positive, checked
 from suboctave.errors import GivenDof, InputError, chosen_dof, shortened
 from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis, harmonic_index, to_complex, to_real
 from suboctave.harmonic.energy import fed
@@ -54,12 +54,17 @@ class PeriodicOrbit:
 
     balance: HarmonicBalance
     x: Array
-    omega: float
+    omega: Positive
     values: Mapping[str, float]
     residual: float
     truncation: float = 0.0
     adaptive: AdaptiveHarmonics | None = None
     zeta: float = 0.0
+
+    def __post_init__(self) -> None:
+        shape = self.balance.basis.size, self.balance.size
+        if self.x.shape != shape:
+            raise InputError(f"x must be coefficients of shape {shape}, not {self.x.shape}", ("x",))
 
     @property
     def basis(self) -> HarmonicBasis:

@@ -7,6 +7,7 @@ are judged after scaling by the diagonal of the mass, `A_ij / sqrt(M_ii M_jj)`, 
 
 from __future__ import annotations
 
+import sys
 import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -350,5 +351,13 @@ def warn_of_negative(what: str) -> None:
         f"{what}: they grow until another force limits them. If this self-excitation is meant, silence the warning "
         "with warnings.simplefilter('ignore', suboctave.NegativeDampingWarning); else change the sign",
         NegativeDampingWarning,
-        stacklevel=5,  # the line that makes the system
+        stacklevel=_outside(),
     )
+
+
+def _outside() -> int:
+    """The stack level of the line outside the package that made the system, for a warning of the caller."""
+    level, frame = 2, sys._getframe(2)
+    while frame.f_back is not None and str(frame.f_globals.get("__name__", "")).startswith("suboctave."):
+        level, frame = level + 1, frame.f_back
+    return level

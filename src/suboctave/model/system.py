@@ -10,12 +10,12 @@ import keyword
 import unicodedata
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from types import MappingProxyType
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from suboctave.arguments import checked
+from suboctave.arguments import Rule, checked
 from suboctave.errors import InputError, Key, Refusals, is_number, located, printable, shortened, suggest
 from suboctave.model.angles import Angle, Turns, check_angles, numbered, read_angles
 from suboctave.model.description import Arrays, build_part, describe_part, from_plain, plain_value
@@ -28,6 +28,8 @@ from suboctave.model.matrices import MatrixCoefficient, check_damping, check_mas
 from suboctave.model.modes import modes_of
 from suboctave.units import UnitSystem
 
+AnElement = Annotated[BaseElement, Rule("an Element", lambda element: True)]
+ALoad = Annotated[Load, Rule("a load", lambda load: True)]
 _MATRICES = ("mass", "damping", "stiffness", "structural")
 _PARTS = (*_MATRICES, "elements", "loads", "parameters", "name", "dof_names", "units", "angles")
 
@@ -70,8 +72,8 @@ class System:
         mass: Any,
         damping: Any,
         stiffness: Any,
-        elements: BaseElement | Iterable[BaseElement] = (),
-        loads: Load | Iterable[Load] = (),
+        elements: AnElement | Iterable[AnElement] = (),
+        loads: ALoad | Iterable[ALoad] = (),
         parameters: Mapping[str, float] | None = None,
         name: str = "",
         dof_names: Iterable[str] = (),

@@ -7,6 +7,7 @@ Everything heavy is imported when a command runs, so that `--help` and a mistype
 
 import io
 import json
+import shlex
 import sys
 import warnings
 from dataclasses import asdict
@@ -15,6 +16,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from suboctave.atomic import free_place
 from suboctave.errors import InputError, NegativeDampingWarning, SuboctaveError, printable, suggest
@@ -24,8 +26,23 @@ from suboctave.version import __version__
 FAILED, WRONG, INTERRUPTED = 1, 2, 130  # 130 is what a shell reports after Ctrl-C
 
 
+class Stopped(Exception):
+    """Ctrl-C, where nothing was computed that could be shown."""
+
+
+class _Commands(TyperGroup):
+    """The commands; Ctrl-C comes through to `main`, which Typer would end without a word."""
+
+    def invoke(self, ctx: Any) -> Any:
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt as cause:
+            raise Stopped(str(cause)) from None
+
+
 application = typer.Typer(
     name="suboctave",
+    cls=_Commands,
     help="Response curves, stability and bifurcations of vibrating structures with nonlinear parts.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
@@ -214,7 +231,9 @@ def _run(
         by_user = outcome.interruption == Interruption()
         status, how = (INTERRUPTED, "Go on") if by_user else (FAILED, "Give more seconds, and go on")
         why = f"{outcome.interruption}; what was computed is kept"
-        screen.print(f"{why}. {how}: suboctave run {study} --resume")
+        again = ["suboctave", "run", str(study), *([] if out is None else ["--out", str(out)])]
+        again += ["--allow-code"] if read.allow_code else []
+        screen.print(f"{why}. {how}: {shlex.join(again)} --resume", soft_wrap=True)
     elif outcome.failed:
         status = WRONG if any(item.wrong_input for item in outcome.failed) else FAILED
         failed = ", ".join(item.step.name for item in outcome.failed)
@@ -506,8 +525,8 @@ def main() -> None:
             warnings.simplefilter("once", NegativeDampingWarning)
             warnings.showwarning = partial(_note, warnings.showwarning)
             application()
-    except KeyboardInterrupt:
-        print("interrupted", file=sys.stderr)
+    except (KeyboardInterrupt, Stopped) as cause:
+        print(_readable(f"interrupted {cause}".rstrip()), file=sys.stderr)
         sys.exit(INTERRUPTED)
     except BrokenPipeError:  # the reader of our output has gone
         sys.stdout = None

@@ -41,13 +41,19 @@ def _print(result: Any, out: Console, note: str) -> None:
     raise TypeError(f"{type(result).__name__} cannot be shown")
 
 
+def _span(values: Any) -> str:
+    """What a curve covers of its parameter: from its first to its last value, or where it turns back within."""
+    (first, last), (low, high) = (f"{values[i]:.6g}" for i in (0, -1)), (f"{end(values):.6g}" for end in (min, max))
+    if low == high:
+        return f"at {low}"
+    return f"{first} to {last}" if {first, last} == {low, high} else f"between {low} and {high}"
+
+
 @_print.register(Branch)
 def _(branch: Branch, out: Console, note: str) -> None:
     """Its bifurcations, how many points, why it ended, what is to be said."""
     values = branch.parameter(branch.name)
-    ends = (min(values), max(values)) if branch.closed else (values[0], values[-1])
-    span = f"{'closed, ' if branch.closed else ''}along {branch.name}, {ends[0]:.6g} to {ends[1]:.6g}"
-    out.print(f": {span}")
+    out.print(f": {'closed, ' if branch.closed else ''}along {branch.name}, {_span(values)}")
     dataset = branch_dataset(branch)
     lines = [list(line) for line in event_lines(dataset)]
     contacts = _contacts(branch)

@@ -59,13 +59,14 @@ class Place:
             self.vector.setflags(write=False)
             return
         asked: Any = dof
-        given = tuple(asked) if isinstance(asked, Sequence | np.ndarray) and not isinstance(asked, str) else (asked,)
+        several = isinstance(asked, Sequence | np.ndarray) and not isinstance(asked, str | bytes)
+        given = tuple(asked) if several and np.ndim(asked) else (asked,)
         with located("dof"):
             if len(given) not in (1, 2) or any(isinstance(e, bool) or not isinstance(e, Integral) for e in given):
                 named = any(isinstance(entry, str) for entry in given)
                 called = f"structure.dof({', '.join(map(repr, given))})"
                 hint = f"; what a structure calls so has the number {called}" if named else ""
-                raise InputError(f"{owner}: dof must be an integer or a pair of integers, not {dof!r}{hint}")
+                raise InputError(f"{owner}: dof must be an integer or a pair of integers, not {shortened(dof)}{hint}")
             self.dofs = tuple(int(entry) for entry in given)
             if min(self.dofs) < 0:
                 raise InputError(f"{owner}: dof {min(self.dofs)} is negative; degrees of freedom count from 0")

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from suboctave.errors import InputError
-from suboctave.model.elements.base import Array, BaseElement, Dof, Element, Place, required
+from suboctave.model.elements.base import Array, BaseElement, Dof, Element, Place, numbers_of, required
 from suboctave.model.elements.batch_form import BatchForm, WrittenForm
 from suboctave.model.elements.smoothness import Sampling, Surface
 from suboctave.model.elements.written import WrittenElement
@@ -206,7 +206,7 @@ class Expression(CoupledElement):
         if not isinstance(expression, str):
             raise InputError(f"Expression: the force must be a text such as 'alpha*x**3', not {expression!r}")
         self.expression = expression
-        places: dict[str, Any] = {"x": dof if direction is None else np.asarray(direction, dtype=float)}
+        places: dict[str, Any] = {"x": dof if direction is None else numbers_of(direction)}
         if inputs is not None:
             if not isinstance(inputs, Mapping) or not inputs:
                 raise InputError("Expression: inputs must be a mapping such as {'x': 0, 'y': 1}")

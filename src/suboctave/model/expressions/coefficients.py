@@ -102,7 +102,7 @@ def coefficient(source: Any) -> Coefficient:
     if isinstance(source, bool) or not isinstance(source, numbers.Real):
         kind = type(source).__name__
         raise InputError(
-            f"a coefficient is a number or an expression in the parameters as text, not {source!r} ({kind})"
+            f"a coefficient is a number or an expression in the parameters as text, not {shortened(source)} ({kind})"
         )
     if not is_number(source):
         raise InputError(f"a coefficient must be finite, not {shortened(source)}")

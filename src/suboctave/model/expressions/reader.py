@@ -150,6 +150,13 @@ class _Reader:
                 if len(arguments) != count or any(isinstance(argument, ast.Starred) for argument in arguments):
                     raise self.refuse(node, f"{name} takes {'exactly one argument' if count == 1 else '2 arguments'}")
                 return self.call(node, name, [self.read(argument, depth + 1) for argument in arguments])
+            case ast.Call(func=ast.Name(id=name), args=[argument]) if _depends_on_time(name, argument, self.functions):
+                raise self.refuse(
+                    node,
+                    "delays are not supported: motions are taken at the time t, and written x, x', x''"
+                    if not isinstance(argument, ast.Name)
+                    else f"motions are written without their time: {name.replace(PRIME, chr(39))}",
+                )
             case ast.Call(func=ast.Name(id=name)) if name not in self.functions:
                 other = _ELSEWHERE.get(name, "")
                 elsewhere = other in self.functions or name == "pow"
@@ -213,6 +220,11 @@ class _Reader:
             raise self.refuse(node, "division by zero")
         known = {"affine": _affine(sign, left, right), "power": power, "size": left.size + right.size + 1.0}
         return self.applied(node, sign, _OPERATIONS[sign], (left, right), **known)
+
+
+def _depends_on_time(name: str, argument: ast.expr, functions: Mapping[str, Any]) -> bool:
+    """Whether it reads as a motion at a time, `x(t)` or `x(t - tau)`."""
+    return name not in functions and any(isinstance(one, ast.Name) and one.id == "t" for one in ast.walk(argument))
 
 
 def _affine(sign: str, left: Form, right: Form) -> dict[str, float] | None:

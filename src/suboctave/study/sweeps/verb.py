@@ -17,7 +17,7 @@ from typing import Annotated, Any, Unpack
 
 from suboctave.atomic import free_place
 from suboctave.errors import InputError, path_of, shortened
-from suboctave.interruption import Interruption
+from suboctave.interruption import Interruption, TimeLimitReached
 from suboctave.model.inputs import check_count, timed
 from suboctave.options import RunOptions, with_options
 from suboctave.progress import Report, reporting
@@ -237,7 +237,10 @@ def _compute(
             tell(kept.computed)
     except KeyboardInterrupt as cause:
         if not kept.computed:
-            raise
+            kept.remove()
+            if isinstance(cause, TimeLimitReached):
+                raise
+            raise KeyboardInterrupt("before the first point was computed: nothing is kept") from None
         return Interruption.of(cause)
     return None
 
