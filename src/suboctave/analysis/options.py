@@ -20,7 +20,7 @@ from suboctave.continuation.linear import one_thread
 from suboctave.curves.events.formulation import FORMULATIONS, Formulation, formulation_of, written
 from suboctave.curves.junction import Junction
 from suboctave.curves.motion import MotionProblem
-from suboctave.curves.starts import Harmonics, linear_response, make_curve
+from suboctave.curves.starts import Harmonics, bounded_response, make_curve
 from suboctave.curves.trace import Settings, Trace
 from suboctave.curves.verdicts import with_verdicts
 from suboctave.errors import InputError
@@ -207,8 +207,8 @@ class CurveRun:
         return make_curve(self.system, self.name, omega, high - low, self.harmonics, nu, linear, self.settings.observe)
 
     def scaled(self, curve: MotionProblem) -> MotionProblem:
-        """The curve in units of the larger one of the linear responses at both ends."""
-        curve.reference = max(curve.size(linear_response(curve, value)) for value in self.ends)
+        """The curve in units of the larger one of the responses without elements at both ends."""
+        curve.reference = max(curve.size(bounded_response(curve, value)) for value in self.ends)
         return curve
 
     @contextmanager

@@ -150,6 +150,8 @@ class _Follower(Driver):
         self._last_located: tuple[BifurcationKind, Sample, Sample, Located | None] | None = None
         self._turned: Bifurcation | None = None
         self._meeting: tuple[CurvePoint, CurvePoint, Meeting] | None = None
+        #: the last motion that was asked whether something floats, and the answer
+        self._loose: tuple[CurvePoint, str | None] | None = None
         self._kinds = solved_by(settings.formulation)
         #: looks for period doublings in place of det J_half, where the formulation has tests of its own
         self._watch: DoublingWatch | None = None
@@ -230,6 +232,8 @@ class _Follower(Driver):
         """True if a step stays on its curve and its interior could be looked at, or ends where it meets another."""
         assert isinstance(a.evaluation, MotionEvaluation)
         assert isinstance(b.curve, MotionProblem)
+        if self._floating(b) is not None:
+            return False
         met = meeting(a, b, self.settings.newton)
         self._meeting = None if met is None else (a, b, met)
         if met is not None:
@@ -243,9 +247,22 @@ class _Follower(Driver):
         return not self._guard.refuses(self._solved_again(self.previous, new), new)
 
     def _arrived(self, a: CurvePoint, b: CurvePoint) -> Arrival | None:
-        """How the curve ends between two neighbours, if it meets another one there."""
+        """How the curve ends between two neighbours, if it meets another one there or its motions begin to float."""
+        loose = self._floating(b)
+        if loose is not None:
+            where = a.curve.where(a.u)
+            return Arrival(None, Ending(EndReason.MOTIONS_END, where, f"the motions end at {where}: beyond it {loose}"))
         known = self._meeting
         return known[2].arrival if known is not None and known[0] is a and known[1] is b else None
+
+    def _floating(self, point: CurvePoint) -> str | None:
+        """What floats on a motion, in words; None if all is held."""
+        known = self._loose
+        if known is None or known[0] is not point:
+            assert isinstance(point.curve, MotionProblem)
+            loose = point.curve.floating(point.evaluation, point.weights, self.settings.newton.tolerance)
+            self._loose = known = (point, loose)
+        return known[1]
 
     def _finer(self, a: CurvePoint, b: CurvePoint) -> MotionProblem | None:
         """The curve with more harmonics, where those of a step leave it open whether a multiplier passes the circle."""

@@ -21,6 +21,7 @@ from suboctave.bifurcation.gaps import rests_in_corner
 from suboctave.continuation.linear import length
 from suboctave.continuation.problem import Array, Curve, Evaluation
 from suboctave.curves.augmentation import PLAIN, Augmentation, Equations
+from suboctave.curves.floating import floating
 from suboctave.curves.still import beyond
 from suboctave.errors import ConvergenceError
 from suboctave.floquet.monodromy import floquet_multipliers
@@ -44,6 +45,8 @@ _REST = 1e-8
 CRITICAL = 1e-3
 #: steps after which that distance is computed again
 CRITICAL_EVERY = 5
+#: share of the largest motion met, or of the reference, that is the unit of motions below it
+LEAST = 0.01
 _TINY = float(np.finfo(float).tiny)
 
 
@@ -153,7 +156,7 @@ class MotionProblem:
     augmentation
         What singles the motions out, with its bordering vectors.
     reference
-        A size of the motion met before the curve begins (the linear response), so that it can start from rest.
+        A size of the motion met before the curve begins (`starts.bounded_response`), so that it can start from rest.
     force
         Size of the forces at the last point: the unit of the scalar equations.
     cache
@@ -286,7 +289,7 @@ class MotionProblem:
         return length(self.balance.column_weights * u[: self.balance.dimension])
 
     def weights(self, u: Array, largest: float) -> Array:
-        size = max(self.size(u), 0.01 * max(largest, self.reference)) or 1.0
+        size = max(self.size(u), LEAST * max(largest, self.reference)) or 1.0
         weights, n = np.empty(len(u)), self.balance.dimension
         np.divide(self.balance.column_weights, size, out=weights[:n])
         if self.augmentation.extras:
@@ -300,6 +303,13 @@ class MotionProblem:
     def unit(self, weights: Array) -> float:
         """Size of a motion that counts as one in `weights`."""
         return float(self.balance.column_weights[0] / weights[0])
+
+    def floating(self, evaluation: Evaluation, weights: Array, tolerance: float) -> str | None:
+        """What floats on a response, in words; None if all is held. `tolerance`: of Newton's method."""
+        assert isinstance(evaluation, MotionEvaluation)
+        if self.augmentation is not PLAIN:
+            return None
+        return floating(evaluation.state, self.unit(weights), tolerance)
 
     def adapted(self, u: Array, evaluation: Evaluation) -> MotionProblem:
         """The curve with the harmonics, samples and bordering vectors of this point."""

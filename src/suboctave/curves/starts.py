@@ -29,10 +29,11 @@ from suboctave.continuation.march import March, SteppingOptions
 from suboctave.continuation.newton import NewtonOptions, correct, null_row
 from suboctave.continuation.point import CurvePoint, make_point
 from suboctave.continuation.problem import Array
-from suboctave.curves.motion import MotionEvaluation, MotionProblem
+from suboctave.curves.floating import Floating, unheld
+from suboctave.curves.motion import LEAST, MotionEvaluation, MotionProblem
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.assembly import apply_blocks, block_diagonal
-from suboctave.harmonic.basis import HarmonicBasis, spectrum_to_real
+from suboctave.harmonic.basis import ComplexArray, HarmonicBasis, spectrum_to_real
 from suboctave.harmonic.condensed import linear_part_of
 from suboctave.harmonic.evaluation import BalanceState, HarmonicBalance
 from suboctave.harmonic.linear_part import LinearPart
@@ -124,15 +125,39 @@ _FREE = 1e-9
 _UNBOUNDED = 1e4
 
 
+def bounded_response(curve: MotionProblem, value: float) -> Array:
+    """u of the response without elements, at a value of the free parameter, of a structure to which a share `LEAST` of
+    B is added: that bounds resonances and the ways of bodies which nothing holds, and hardly changes anything else.
+    """
+    state = _at_rest(curve, value)
+    blocks = state.blocks + LEAST * _holding_blocks(state)
+    return curve.join(apply_blocks(np.linalg.inv(blocks).astype(complex), state.load), value)
+
+
 def linear_response(curve: MotionProblem, value: float) -> Array:
-    """u of the response without elements, at a value of the free parameter."""
-    state = curve.balance.at(*curve.split(curve.join(np.zeros(curve.balance.dimension), value)))
+    """u of the response without elements, at a value of the free parameter; where that is no motion of any use, in an
+    undamped resonance or of a body that hardly anything holds, the bounded one.
+    """
+    state, bounded = _at_rest(curve, value), bounded_response(curve, value)
     try:
         inverse = np.linalg.inv(state.blocks).astype(complex)
     except np.linalg.LinAlgError:
-        # a free body or an undamped resonance: the least motion that balances what can be balanced
-        inverse = np.linalg.pinv(state.blocks).astype(complex)
-    return curve.join(apply_blocks(inverse, state.load), value)
+        return bounded
+    u = curve.join(apply_blocks(inverse, state.load), value)
+    return u if LEAST * curve.size(u) <= curve.size(bounded) else bounded
+
+
+def _at_rest(curve: MotionProblem, value: float) -> BalanceState:
+    """The system at rest, at a value of the free parameter."""
+    return curve.balance.at(*curve.split(curve.join(np.zeros(curve.balance.dimension), value)))
+
+
+def _holding_blocks(state: BalanceState) -> ComplexArray:
+    """B at the harmonics, (H + 1, size, size): `omega^2 (1 + i k / nu) m` at the multiple k omega / nu."""
+    multiples = state.basis.multiples
+    masses = np.diag(state.omega**2 * state.balance.scales()[0] ** 2)
+    blocks: ComplexArray = (1.0 + 1j * multiples)[:, None, None] * masses
+    return blocks
 
 
 #: how far off the value that was asked for a motion may lie, relative to it
@@ -163,7 +188,7 @@ def start_point(
         If no motion is found; says what was tried.
     """
     tried = []
-    linear = linear_response(curve, value)
+    linear = bounded_response(curve, value)
     curve.reference = max(curve.reference, curve.size(linear))
     if given is not None:
         if isinstance(given, PeriodicOrbit) and curve.adaptive is not None and given.basis.nu == curve.balance.basis.nu:
@@ -197,19 +222,24 @@ def start_point(
         ]
     if curve.adaptive is not None:
         ways.append((f"{_PATH} with as many as it needs", partial(_released, curve, value, newton)))
-    loose = None
+    loose: Floating | str | None = None
     for name, guess_by in ways:
         try:
             begun, guess = guess_by()
             begun = curve.with_balance(begun.balance)
-            loose = _unheld(begun, guess)
+            loose = loose or _loose(begun, guess)
             return settled(begun, guess, patient)
+        except Floating as failure:
+            loose = failure
         except ConvergenceError as failure:
             reason = str(failure)
             if reason not in tried:
                 tried += [name, reason]
+    what = f"no motion found to start from at {curve.where(linear)}"
+    if isinstance(loose, Floating):
+        raise ConvergenceError(f"{what}: {loose}, or start elsewhere in the range")
     raise ConvergenceError(
-        f"no motion found to start from at {curve.where(linear)}{loose or ''}. Tried: " + "; ".join(tried) + ". "
+        f"{what}{loose or ''}. Tried: " + "; ".join(tried) + ". "
         "Start elsewhere in the range, or give start= (an orbit, or a state near the motion)"
     )
 
@@ -231,22 +261,17 @@ def linear_up_to(rest: BalanceState, change: Array, allowed: float) -> tuple[flo
     return _SIZES[at - 1] if at else 0.0, _SIZES[at] if at < len(_SIZES) else math.inf
 
 
-def _unheld(curve: MotionProblem, u: Array) -> str | None:
-    """What may move freely beside a motion, in words; None if nothing may."""
+def _loose(curve: MotionProblem, u: Array) -> Floating | str | None:
+    """What lets Newton's method fail from a guess: what nothing holds beside it, an undamped resonance; None for neither."""
     state = curve.balance.at(*curve.split(u))
     weights = curve.balance.row_weights(curve.balance.dimension)
     _, sizes, rows = np.linalg.svd(state.jacobian * weights[:, None] * weights)
     if sizes[-1] > _FREE * state.omega**2:
         return None
     loose = curve.balance.shaped(rows[-1])
-    mean = length(loose[0])
-    if mean < 0.9:
+    if length(loose[0]) < 0.9:
         return ": an undamped resonance lies there. Give the structure some damping, or go beside it"
-    dof = int(np.argmax(np.abs(loose[0])))
-    return (
-        f": nothing holds DOF {dof}, whose mean position is arbitrary there (it floats between its stops, or has no "
-        "stiffness). Give it a small stiffness, or a load that reaches a stop"
-    )
+    return Floating(unheld(state, loose[0] * curve.balance.scales()[1]))
 
 
 def _with_more_harmonics(curve: MotionProblem) -> Iterator[MotionProblem]:
@@ -296,6 +321,9 @@ def settled(
         if wanted > present:
             fewest = wanted
         u, curve = adapted.transfer(solved.u, curve), adapted
+    loose = curve.floating(solved.evaluation, weights, newton.tolerance)
+    if loose is not None:
+        raise Floating(loose)
     return make_point(solved, None, 0.0)
 
 
@@ -414,11 +442,7 @@ class _Held(MotionProblem):
     @lazy
     def hold(self) -> Array:
         """B."""
-        balance, rest = self.balance, self.rest
-        multiples = np.arange(balance.basis.harmonics + 1) / balance.basis.nu
-        blocks = np.zeros((len(multiples), balance.size, balance.size), dtype=complex)
-        blocks[:] = np.diag(rest.omega**2 * balance.scales()[0] ** 2)
-        return block_diagonal(blocks * (1.0 + 1j * multiples)[:, None, None], True)
+        return block_diagonal(_holding_blocks(self.rest), True)
 
     def first(self) -> Array:
         """The held motion without a share of its own: linear."""
