@@ -110,6 +110,10 @@ class FunctionError(InputError):
     result: Any = None
 
 
+class NotFiniteError(ConvergenceError):
+    """A force is not finite on a motion, or on the way to it."""
+
+
 class TimeLimitError(SuboctaveError):
     """A time limit (`seconds=`) that was reached before there was anything to keep."""
 

@@ -20,6 +20,7 @@ class EndReason(StrEnum):
     CLOSED = "closed"
     MET_BRANCH = "met branch"
     MOTIONS_END = "motions end"  # the motions that it consists of do not exist beyond
+    NOT_FINITE = "not finite"  # the equations are not finite beyond
     STEP_TOO_SMALL = "step too small"
     MAX_POINTS = "max points"
     ASTRAY = "astray"  # it goes round and round without passing its start
@@ -55,6 +56,7 @@ _SENTENCES = {
     EndReason.RANGE_END: "reached the end of the range at {where}",
     EndReason.LEFT_RANGE: "left the range after {where}; no solution was found exactly on its end",
     EndReason.CLOSED: "the curve closed on itself",
+    EndReason.NOT_FINITE: "the motions end at {where}: beyond it {detail}",
     EndReason.STEP_TOO_SMALL: (
         "step size fell below {detail}. Try more harmonics, a smoother law, or a smaller min_step"
     ),

@@ -22,8 +22,8 @@ from suboctave.continuation.ending import Ending, EndReason
 from suboctave.continuation.linear import cosine, distance, length
 from suboctave.continuation.newton import NewtonOptions, Solved, closely, correct
 from suboctave.continuation.point import CurvePoint, between, make_point, solved_again
-from suboctave.continuation.problem import Array, Curve
-from suboctave.errors import ConvergenceError, InputError
+from suboctave.continuation.problem import Array, Curve, Evaluation
+from suboctave.errors import ConvergenceError, InputError, NotFiniteError
 
 #: points behind the last one that a prediction takes into account
 _BEHIND = 2
@@ -229,6 +229,9 @@ class March:
             here = self._carried(curve, point, largest)
             try:
                 new, deviation, turn = self._advance(here, step, behind)
+            except NotFiniteError as failure:
+                self.ending = Ending(EndReason.NOT_FINITE, here.curve.where(here.u), str(failure))
+                return
             except ConvergenceError as failure:
                 where = here.curve.where(here.u)
                 self.ending = Ending(EndReason.STEP_TOO_SMALL, where, f"{options.min_step:.0e} at {where}: {failure}")
@@ -314,7 +317,7 @@ class March:
                 if bound is not None:
                     solved.u[curve.parameter] = bound
                 taken = distance(solved.u, point.u, point.weights)
-                new = make_point(solved, point.tangent, point.arclength + taken)
+                new = _joined(point, make_point(solved, point.tangent, point.arclength + taken))
                 turn = _angle(point, new)
                 if step <= options.min_step:
                     # not at a jump across a corner, onto the part of the curve behind it, to be followed back into it
@@ -337,7 +340,8 @@ class March:
             except ConvergenceError as error:
                 failure = error
             if step <= options.min_step:
-                return self._around_corner(point, failure)
+                ahead = _severed(point, point.u + options.max_step * point.tangent)
+                return self._around_corner(point, failure if ahead is None else NotFiniteError(ahead))
             # what lies behind may not tell what comes
             order = max(1, order - 1)
             step = max(0.5 * step, options.min_step)
@@ -397,7 +401,7 @@ class March:
             try:
                 solved = correct(curve, guess, row, weights, self.newton)
                 taken = distance(solved.u, point.u, weights)
-                new = make_point(solved, heading * row, point.arclength + taken)
+                new = _joined(point, make_point(solved, heading * row, point.arclength + taken))
             except ConvergenceError:
                 nearer = None
                 continue
@@ -425,6 +429,21 @@ class March:
         # the predictor's curvature may carry a step a little beyond its length: keep the distance below the largest
         # allowed
         return min(0.98 * options.max_step, max(step, options.min_step))
+
+
+def _severed(point: CurvePoint, u: Array, evaluation: Evaluation | None = None) -> str | None:
+    """Where the equations are not finite between a point and u, in words, if the curve can tell."""
+    tells: Callable[[CurvePoint, Array, Evaluation | None], str | None] | None
+    tells = getattr(point.curve, "severed", None)
+    return None if tells is None else tells(point, u, evaluation)
+
+
+def _joined(point: CurvePoint, new: CurvePoint) -> CurvePoint:
+    """The second of two neighbours; NotFiniteError if the equations are not finite on the way to it."""
+    reason = _severed(point, new.u, new.evaluation)
+    if reason is not None:
+        raise NotFiniteError(reason)
+    return new
 
 
 def _rescaled(curve: Curve, point: CurvePoint, largest: float) -> CurvePoint:

@@ -52,8 +52,8 @@ class NewtonOptions:
         Length in scaled arclength to which corrections are shortened.
     rounding
         Whether the iterate of least residual counts as solved where corrections have come down to rounding of the
-        unknowns: right behind a grazing the equations are so steep that the last digit of an unknown is more than the
-        tolerance.
+        unknowns, if that residual is below the root of the tolerance: right behind a grazing the equations are so steep
+        that the last digit of an unknown is more than the tolerance.
     """
 
     tolerance: Positive = 1e-10
@@ -180,7 +180,8 @@ def correct(
             if lost and not options.damped and nearest is None:
                 break
         previous = size if share == 1.0 else math.inf
-    if nearest is not None:
+    # beside a pole of the equations a rounding of the unknowns moves them by any amount: nothing is solved there
+    if nearest is not None and nearest.evaluation.error <= math.sqrt(options.tolerance):
         return nearest
     where = curve.where(guess)
     raise ConvergenceError(

@@ -49,7 +49,9 @@ class Curve(Problem, Protocol):
     """A curve as the engine sees it. `parameter` is the index in u of the parameter that bounds and directions refer
     to.
 
-    It may have an attribute `delicate`, true where its tangents ask for points as close as rounding allows.
+    It may have an attribute `delicate`, true where its tangents ask for points as close as rounding allows, and a
+    method `severed(point, u, evaluation)` that says, in words, where its equations are not finite between a point and
+    u, which has been solved for if its evaluation is given.
     """
 
     @property

@@ -41,7 +41,7 @@ from suboctave.curves.motion import CRITICAL, MotionEvaluation, MotionProblem
 from suboctave.curves.refine import bifurcation_at, solved_bifurcation, solved_in, turns_at
 from suboctave.curves.sample import Sample
 from suboctave.curves.trace import Settings, Trace, joined
-from suboctave.errors import ConvergenceError
+from suboctave.errors import ConvergenceError, NotFiniteError
 from suboctave.harmonic.truncation import next_harmonics
 from suboctave.interruption import Interruption, stopping, users_function
 
@@ -90,7 +90,8 @@ class Driver(ABC):
             if self.previous is None:
                 raise
             self._interrupted()
-            trace.ends(Ending(EndReason.FAILED, self.previous.where, str(failure)))
+            reason = EndReason.NOT_FINITE if isinstance(failure, NotFiniteError) else EndReason.FAILED
+            trace.ends(Ending(reason, self.previous.where, str(failure)))
         self._finish()
         if trace.closed:
             drop_seam(trace.bifurcations)

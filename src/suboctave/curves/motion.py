@@ -19,16 +19,18 @@ import numpy as np
 
 from suboctave.bifurcation.gaps import rests_in_corner
 from suboctave.continuation.linear import length
+from suboctave.continuation.point import CurvePoint
 from suboctave.continuation.problem import Array, Curve, Evaluation
 from suboctave.curves.augmentation import PLAIN, Augmentation, Equations
 from suboctave.curves.floating import floating
 from suboctave.curves.still import beyond
-from suboctave.errors import ConvergenceError
+from suboctave.errors import ConvergenceError, NotFiniteError
 from suboctave.floquet.monodromy import floquet_multipliers
 from suboctave.floquet.result import FloquetResult
 from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.energy import fed
 from suboctave.harmonic.evaluation import BalanceState, HarmonicBalance
+from suboctave.harmonic.finite import unbounded_along, unbounded_between
 from suboctave.harmonic.truncation import (
     AdaptiveHarmonics,
     choose_harmonics,
@@ -303,6 +305,18 @@ class MotionProblem:
     def unit(self, weights: Array) -> float:
         """Size of a motion that counts as one in `weights`."""
         return float(self.balance.column_weights[0] / weights[0])
+
+    def severed(self, point: CurvePoint, u: Array, evaluation: Evaluation | None = None) -> str | None:
+        """Where a force is not finite between a motion and u, or along that, in words; see `Curve`."""
+        if self.balance.settled:
+            return None
+        assert isinstance(point.evaluation, MotionEvaluation)
+        assert evaluation is None or isinstance(evaluation, MotionEvaluation)
+        try:
+            state = (evaluation or self.evaluate(u)).state
+            return unbounded_along(state) or unbounded_between(point.evaluation.state, state)
+        except NotFiniteError as failure:
+            return str(failure)
 
     def floating(self, evaluation: Evaluation, weights: Array, tolerance: float) -> str | None:
         """What floats on a response, in words; None if all is held. `tolerance`: of Newton's method."""

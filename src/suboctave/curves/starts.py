@@ -31,7 +31,7 @@ from suboctave.continuation.point import CurvePoint, make_point
 from suboctave.continuation.problem import Array
 from suboctave.curves.floating import Floating, unheld
 from suboctave.curves.motion import LEAST, MotionEvaluation, MotionProblem
-from suboctave.errors import ConvergenceError, InputError
+from suboctave.errors import ConvergenceError, InputError, NotFiniteError
 from suboctave.harmonic.assembly import apply_blocks, block_diagonal
 from suboctave.harmonic.basis import ComplexArray, HarmonicBasis, spectrum_to_real
 from suboctave.harmonic.condensed import linear_part_of
@@ -156,8 +156,7 @@ def _holding_blocks(state: BalanceState) -> ComplexArray:
     """B at the harmonics, (H + 1, size, size): `omega^2 (1 + i k / nu) m` at the multiple k omega / nu."""
     multiples = state.basis.multiples
     masses = np.diag(state.omega**2 * state.balance.scales()[0] ** 2)
-    blocks: ComplexArray = (1.0 + 1j * multiples)[:, None, None] * masses
-    return blocks
+    return np.asarray((1.0 + 1j * multiples)[:, None, None] * masses, dtype=complex)
 
 
 #: how far off the value that was asked for a motion may lie, relative to it
@@ -223,6 +222,7 @@ def start_point(
     if curve.adaptive is not None:
         ways.append((f"{_PATH} with as many as it needs", partial(_released, curve, value, newton)))
     loose: Floating | str | None = None
+    wall: NotFiniteError | None = None
     for name, guess_by in ways:
         try:
             begun, guess = guess_by()
@@ -232,12 +232,17 @@ def start_point(
         except Floating as failure:
             loose = failure
         except ConvergenceError as failure:
+            wall = failure if isinstance(failure, NotFiniteError) else wall
             reason = str(failure)
             if reason not in tried:
                 tried += [name, reason]
     what = f"no motion found to start from at {curve.where(linear)}"
     if isinstance(loose, Floating):
         raise ConvergenceError(f"{what}: {loose}, or start elsewhere in the range")
+    if wall is not None:
+        raise NotFiniteError(
+            f"{what}: on the way {wall}. Give start= (an orbit, or a state), on the side of that place that is meant"
+        )
     raise ConvergenceError(
         f"{what}{loose or ''}. Tried: " + "; ".join(tried) + ". "
         "Start elsewhere in the range, or give start= (an orbit, or a state near the motion)"
@@ -262,7 +267,7 @@ def linear_up_to(rest: BalanceState, change: Array, allowed: float) -> tuple[flo
 
 
 def _loose(curve: MotionProblem, u: Array) -> Floating | str | None:
-    """What lets Newton's method fail from a guess: what nothing holds beside it, an undamped resonance; None for neither."""
+    """Why Newton's method fails from a guess: what nothing holds, or an undamped resonance; None for neither."""
     state = curve.balance.at(*curve.split(u))
     weights = curve.balance.row_weights(curve.balance.dimension)
     _, sizes, rows = np.linalg.svd(state.jacobian * weights[:, None] * weights)

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from suboctave.arguments import checked
-from suboctave.errors import ConvergenceError
+from suboctave.errors import NotFiniteError
 from suboctave.harmonic.aft.channel import Channel, Group, laws_along
 from suboctave.harmonic.aft.law import Along, LawAlong, LocalMotion
 from suboctave.harmonic.aft.table import PackedLaws
@@ -251,7 +251,7 @@ class BalanceState:
         if np.isfinite(spectra[:, 0]).all():
             return
         labels = ", ".join(self.laws.members[i].element.label for i in group.members)
-        raise ConvergenceError(
+        raise NotFiniteError(
             f"{labels} returned a force that is not finite at omega = {self.omega:.6g} "
             f"(largest coefficient of the motion {np.abs(self.x).max():.3g})"
         )

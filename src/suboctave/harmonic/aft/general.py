@@ -13,9 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from suboctave.errors import ConvergenceError, InputError
+from suboctave.errors import ConvergenceError, InputError, NotFiniteError
 from suboctave.harmonic.aft.corners import Comb, Corner, by_coefficients, combs, corners_along, finite_part, third_at
 from suboctave.harmonic.aft.law import Along, CoefficientSpectra, LawAlong, Member, Second, Third
+from suboctave.harmonic.aft.poles import POINTS, unbounded
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.quadrature import (
     FEWEST,
@@ -40,6 +41,9 @@ from suboctave.model.elements.smoothness import (
 )
 
 __all__ = ["GeneralLaw", "Smoothness"]
+
+#: how far beyond a motion, as a share of its size, the place is looked for that makes its force too sharp for samples
+_BEYOND = 0.1
 
 
 class Smoothness(NamedTuple):
@@ -271,6 +275,7 @@ class GeneralLaw(LawAlong):
             if previous is not None and settled(previous, current):
                 return count // 2
             previous, count = current, 2 * count
+        self._require_room(member)
         raise ConvergenceError(
             f"{member.element.label}: the force does not settle with {MOST} samples per period: it is too sharp to be "
             "sampled blindly. Of a text (Expression) places are known where it has corners (abs, max, ...), or is "
@@ -278,3 +283,45 @@ class GeneralLaw(LawAlong):
             "returning SharpSampling(points, widths) or CornerSampling). Elements that are exact: ElasticStop, "
             "Freeplay, TanhFriction"
         )
+
+    def unbounded_at(self, member: Member) -> float | None:
+        """A displacement, along the first input, at which the force of one of its elements is not finite on the motion;
+        None if it is finite all along.
+        """
+
+        def force(tau: Array) -> Array:
+            return force_of(member, *self.state_at(np.cos(tau), np.sin(tau)))
+
+        tau = unbounded(force, np.linspace(0.0, 2.0 * np.pi, max(FEWEST, 4 * self.along.high) + 1))
+        return None if tau is None else float(self.state_at(np.cos([tau]), np.sin([tau]))[0][0, 0])
+
+    def _require_room(self, member: Member) -> None:
+        """Refuse a motion whose force is so sharp because it is not finite there, or right beyond; NotFiniteError."""
+        place, near = self.unbounded_at(member), ""
+        if place is None:
+            q, theta = self.path
+            slopes = np.abs(as_coupled(member.element).tangent(q, theta, member.coefficients)[1]).max(axis=0)
+            at = int(np.argmax(np.where(np.isfinite(slopes), slopes, np.inf)))
+            way = _BEYOND * (q[:, at] - q.mean(axis=1))
+
+            def force(share: Array) -> Array:
+                beyond = q[:, at, None] + way[:, None] * share
+                return force_of(member, beyond, np.full(len(share), theta[at]))
+
+            share = unbounded(force, np.linspace(0.0, 1.0, POINTS))
+            if share is None:
+                return
+            place = float(q[0, at] + share * way[0])
+            near = f", and the motion comes closer to that than {MOST} samples per period show"
+        raise NotFiniteError(f"{not_finite(member, place)}{near}")
+
+
+def force_of(member: Member, q: Array, theta: Array) -> Array:
+    """The force of an element at states, finite or not."""
+    with np.errstate(all="ignore"):
+        return np.asarray(as_coupled(member.element).tangent(q, theta, member.coefficients)[0], dtype=float)
+
+
+def not_finite(member: Member, place: float) -> str:
+    """That the force of an element is not finite at a displacement."""
+    return f"the force of {member.element.label} is not finite (at a displacement of {place:.6g})"
