@@ -21,10 +21,19 @@ from suboctave.bifurcation.bordered import at_values, branching_equation, null_v
 from suboctave.continuation import CurvePoint, NewtonOptions, SteppingOptions
 from suboctave.continuation.linear import length
 from suboctave.continuation.problem import Array
+from suboctave.curves.blow_up import DoubledMotions
 from suboctave.curves.events.locate import Singular
 from suboctave.curves.follow import both_ways, follow
 from suboctave.curves.identity import same_event
-from suboctave.curves.junction import UNSEEN, Beside, beside, curvature_of, emanating, period_name
+from suboctave.curves.junction import (
+    UNSEEN,
+    Beside,
+    beside,
+    curvature_of,
+    emanating,
+    leaving_doubling,
+    period_name,
+)
 from suboctave.curves.leaving import branch_beside, first_beside
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.starts import Harmonics, harmonics_of, linear_up_to, own_linear_part, start_point
@@ -467,12 +476,18 @@ def _closest(item: Bifurcation, curve: MotionProblem, u: Array, direction: Array
     # over the period of the branch
     expected = item.floquet.multipliers ** (2 if item.kind == "PD" else 1)
     leads = curvature_of(item.normal_form)
-    close = beside(curve, u, direction / length(weights * direction), weights, expected, settings.newton, leads)
+    if item.kind == "PD":
+        assert isinstance(curve, DoubledMotions)
+        close = leaving_doubling(curve, u, direction, expected, settings.newton, leads)
+    else:
+        close = beside(curve, u, direction / length(weights * direction), weights, expected, settings.newton, leads)
     if close is None:
         raise ConvergenceError(
             f"no point of the other branch was found beside the {KINDS[item.kind].words} at {curve.where(u)}: its "
             "direction may be too close to that of the first branch, or too few harmonics are kept"
         )
+    if item.kind == "PD":
+        return close
     point = close.point
     adapted = curve.adapted(point.u, point.evaluation)
     if adapted is curve:

@@ -51,6 +51,27 @@ def make_point(solved: Solved[Curve], along: Array | None, arclength: float) -> 
     return CurvePoint(s.curve, s.u, t, s.weights, s.evaluation, sign, arclength, s.iterations, s.factor)
 
 
+def solved_point(
+    curve: Curve,
+    guess: Array,
+    row: Array,
+    weights: Array,
+    newton: NewtonOptions,
+    along: Array | None,
+    arclength: float,
+    spare: float = 0.0,
+) -> CurvePoint:
+    """The point of a curve in the plane through a guess across a scaled row, `spare` as in `newton.correct`; solved for
+    in the coordinates in which the curve is regular, where it has its own. May raise ConvergenceError.
+    """
+    regular = getattr(curve, "regular", None)
+    own = None if regular is None else regular(guess)
+    if own is not None:
+        point: CurvePoint = own.solved_point(guess, row, weights, newton, along, arclength)
+        return point
+    return make_point(correct(curve, guess, row, weights, newton, spare=spare), along, arclength)
+
+
 def between(a: CurvePoint, b: CurvePoint, fraction: float) -> Array:
     """Cubic Hermite interpolation of the curve between two neighbours, in the discretisation of b."""
     ua, ta = b.curve.transfer(a.u, a.curve), b.curve.transfer(a.tangent, a.curve)
@@ -78,21 +99,21 @@ def point_between(
     chord = b.u - b.curve.transfer(a.u, a.curve)
     row = b.weights * chord
     row /= length(row)
+    arclength = a.arclength + fraction * (b.arclength - a.arclength)
     try:
-        solved = correct(b.curve, guess, row, b.weights, closely(newton) if exactly else newton)
+        return solved_point(b.curve, guess, row, b.weights, closely(newton) if exactly else newton, chord, arclength)
     except ConvergenceError:
         if not exactly:
             raise
-        solved = correct(b.curve, guess, row, b.weights, newton)
-    return make_point(solved, chord, a.arclength + fraction * (b.arclength - a.arclength))
+        return solved_point(b.curve, guess, row, b.weights, newton, chord, arclength)
 
 
 def point_ahead(point: CurvePoint, way: float, newton: NewtonOptions) -> CurvePoint:
     """The point of the curve in the plane across the tangent of one, a way along that; may raise ConvergenceError."""
     curve, weights, along = point.curve, point.weights, point.tangent
     row = weights * along
-    solved = correct(curve, point.u + way * along, row / length(row), weights, newton)
-    return make_point(solved, along, point.arclength + way)
+    arclength = point.arclength + way
+    return solved_point(curve, point.u + way * along, row / length(row), weights, newton, along, arclength)
 
 
 def solved_again(
@@ -103,7 +124,7 @@ def solved_again(
     """
     u, along = curve.transfer(point.u, point.curve), curve.transfer(point.tangent, point.curve)
     row = weights * along
-    return make_point(correct(curve, u, row / length(row), weights, newton, spare=spare), along, point.arclength)
+    return solved_point(curve, u, row / length(row), weights, newton, along, point.arclength, spare)
 
 
 def crossing_matrix(point: CurvePoint) -> Array:

@@ -51,7 +51,8 @@ class Curve(Problem, Protocol):
 
     It may have an attribute `delicate`, true where its tangents ask for points as close as rounding allows, and a
     method `severed(point, u, evaluation)` that says, in words, where its equations are not finite between a point and
-    u, which has been solved for if its evaluation is given.
+    u, which has been solved for if its evaluation is given. A method `regular(u)` gives other coordinates in which
+    points beside u are solved for (`point.solved_point`), None where there u itself will do.
     """
 
     @property

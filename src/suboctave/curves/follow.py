@@ -16,9 +16,12 @@ from suboctave.bifurcation.bifurcation import CONTACT_KINDS, Bifurcation
 from suboctave.continuation import CurvePoint, Event, March
 from suboctave.continuation.ending import Ending, EndReason
 from suboctave.continuation.events import Bracket
+from suboctave.continuation.linear import distance
 from suboctave.continuation.march import Arrival
 from suboctave.continuation.newton import NewtonOptions
 from suboctave.continuation.point import point_ahead, point_between, solved_again
+from suboctave.continuation.problem import Curve
+from suboctave.curves.blow_up import BlownUp
 from suboctave.curves.corners import beyond_corner
 from suboctave.curves.events.grazings import locate_grazings
 from suboctave.curves.events.layer import behind_their_grazings
@@ -34,7 +37,7 @@ from suboctave.curves.events.monitors import (
 )
 from suboctave.curves.guard import Crossing, GuardedStep, StepGuard
 from suboctave.curves.identity import drop_seam, same_event
-from suboctave.curves.junction import UNSEEN, Meeting, meeting
+from suboctave.curves.junction import LOST, UNSEEN, Meeting, meeting, passes_doubling, regular_point
 from suboctave.curves.leaving import multiple_at
 from suboctave.curves.ledgers import REASON, CountCheck, DoublingWatch, HiddenDoublings, pair_in
 from suboctave.curves.motion import CRITICAL, MotionEvaluation, MotionProblem
@@ -129,10 +132,10 @@ class _Follower(Driver):
         super().__init__(settings)
         hooks = self._clear, self._arrived, self._finer
         options = bounds, settings.newton, settings.stepping, *hooks
-        self.march = March(start, direction, *options)
-        headed = start.turned if start.tangent[start.curve.parameter] * direction < 0.0 else start
+        headed = regular_point(start.turned if start.tangent[start.curve.parameter] * direction < 0.0 else start)
+        self.march = March(headed, 0.0, *options)
         #: goes on from a point behind a corner
-        self._from = lambda point: March(point, 0.0, *options, home=headed)
+        self._from = lambda point: March(regular_point(point), 0.0, *options, home=headed)
         #: size of the last motion at which the parameter moved, or of the first, and how much larger motions may become
         self._size: tuple[float, float] | None = None
         #: where the corners that were passed lie
@@ -165,11 +168,11 @@ class _Follower(Driver):
 
     def _walk(self) -> None:
         # in a fresh installation the first verdict on stability waits for its kernels to be compiled
-        self._report(self.march.start)
+        self._report(self._plain(self.march.start))
         ending: Ending | None = None
         while True:
             for point in self.march:
-                self._accept(point)
+                self._accept(self._plain(point))
                 ending = self._growing()
                 if ending is not None or (self._turned is not None and self.settings.half):
                     break
@@ -212,7 +215,7 @@ class _Follower(Driver):
     def _interrupted(self) -> None:
         trace = self.trace
         if self.previous is None:
-            self.previous = start = self._sample(self.march.start)
+            self.previous = start = self._sample(self._plain(self.march.start))
             trace.points.append(start.as_point(start.floquet))
         # of the step that was under way nothing counts
         trace.cut(trace.points[-1].arclength)
@@ -229,16 +232,26 @@ class _Follower(Driver):
         known = self._candidate
         return known if known is not None and known.point is point else Sample(point, self.settings.stability)
 
+    def _plain(self, point: CurvePoint) -> CurvePoint:
+        """A point of the march as one of the curve of motions, behind the last one taken in."""
+        if not isinstance(point.curve, BlownUp):
+            return point
+        if self.previous is None:
+            return point.curve.plain_point(point, 0.0)
+        return point.curve.behind(point, self.previous.point)
+
     def _clear(self, a: CurvePoint, b: CurvePoint) -> bool:
         """True if a step stays on its curve and its interior could be looked at, or ends where it meets another."""
+        self._meeting = None
+        if passes_doubling(b):
+            met = meeting(a, b, self.settings.newton)
+            self._meeting = None if met is None else (a, b, met)
+            return met is not None
+        a, b = self._plain(a), self._plain(b)
         assert isinstance(a.evaluation, MotionEvaluation)
         assert isinstance(b.curve, MotionProblem)
         if self._floating(b) is not None:
             return False
-        met = meeting(a, b, self.settings.newton)
-        self._meeting = None if met is None else (a, b, met)
-        if met is not None:
-            return True
         self._candidate = new = self._sample(b)
         if self.previous is None or self.previous.at_rest or new.at_rest:
             return True
@@ -249,12 +262,21 @@ class _Follower(Driver):
 
     def _arrived(self, a: CurvePoint, b: CurvePoint) -> Arrival | None:
         """How the curve ends between two neighbours, if it meets another one there or its motions begin to float."""
-        loose = self._floating(b)
-        if loose is not None:
+        if not passes_doubling(b):
+            loose = self._floating(self._plain(b))
+            if loose is None:
+                return None
             where = a.curve.where(a.u)
             return Arrival(None, Ending(EndReason.MOTIONS_END, where, f"the motions end at {where}: beyond it {loose}"))
         known = self._meeting
-        return known[2].arrival if known is not None and known[0] is a and known[1] is b else None
+        if known is None or known[0] is not a or known[1] is not b:
+            # a step too short to be halved
+            met = meeting(a, b, self.settings.newton)
+            if met is None:
+                where = a.curve.where(a.u)
+                return Arrival(None, Ending(EndReason.NO_MEANING, where, f"{LOST} at {where}"))
+            self._meeting = known = (a, b, met)
+        return None if known[2].finer is not None else self._before(known[2].arrival)
 
     def _floating(self, point: CurvePoint) -> str | None:
         """What floats on a motion, in words; None if all is held."""
@@ -265,9 +287,21 @@ class _Follower(Driver):
             self._loose = known = (point, loose)
         return known[1]
 
-    def _finer(self, a: CurvePoint, b: CurvePoint) -> MotionProblem | None:
+    def _before(self, arrival: Arrival) -> Arrival:
+        """An arrival whose last point lies behind the last one taken in."""
+        last, before = arrival.point, self.previous
+        if last is None or before is None:
+            return arrival
+        here = last.curve.transfer(before.point.u, before.curve)
+        arclength = before.place + distance(last.u, here, last.weights)
+        return replace(arrival, point=replace(last, arclength=arclength))
+
+    def _finer(self, a: CurvePoint, b: CurvePoint) -> Curve | None:
         """The curve with more harmonics, where those of a step leave it open whether a multiplier passes the circle."""
-        self._candidate = new = self._sample(b)
+        if self._meeting is not None:
+            finer = self._meeting[2].finer
+            return None if finer is None else finer.blown_up
+        self._candidate = new = self._sample(self._plain(b))
         old, rule = self.previous, new.curve.adaptive
         # where sub-harmonic motions are born and end depends on their harmonics
         if rule is None or old is None or old.at_rest or new.at_rest or new.state.basis.nu > 1:

@@ -12,29 +12,30 @@ from __future__ import annotations
 
 import math
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
 from suboctave.bifurcation.bifurcation import Bifurcation
-from suboctave.bifurcation.bordered import doubled_direction
+from suboctave.bifurcation.bordered import doubled_direction, null_vectors
 from suboctave.bifurcation.normal_form import NormalForm, normal_form
 from suboctave.continuation.ending import Ending, EndReason
-from suboctave.continuation.linear import length
+from suboctave.continuation.linear import distance, length
 from suboctave.continuation.march import Arrival
 from suboctave.continuation.newton import NewtonOptions, correct
 from suboctave.continuation.point import CurvePoint, between, make_point
 from suboctave.continuation.problem import Array
+from suboctave.curves.blow_up import BlownUp, BlownUpEvaluation, DoubledMotions
 from suboctave.curves.events.locate import Guess, Singular, locate_multiple, locate_singular
-from suboctave.curves.events.monitors import position
 from suboctave.curves.identity import apart
-from suboctave.curves.motion import MotionEvaluation, MotionProblem
+from suboctave.curves.motion import MotionProblem
 from suboctave.errors import ConvergenceError
 from suboctave.floquet.monodromy import floquet_multipliers
 from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.perturbation import Kind
+from suboctave.harmonic.truncation import choose_harmonics
 
 #: sub-harmonic share of a motion that is none any more
 NOTHING_LEFT = 1e-5
@@ -82,22 +83,29 @@ def doubled_size(curve: MotionProblem, u: Array) -> float:
     return float(np.linalg.norm(parts_of(curve, u)[0]))
 
 
-#: distances from a bifurcation, in scaled arclength, at which a branch that leaves or meets it begins or ends
+#: distances from a branch point, in scaled arclength, at which a branch that leaves it begins
 _DISTANCES = (3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6)
+#: odd part, in units of the motion, of the first and last motions of a branch of doubled motions, and the least to
+#: which it is divided by the third number while the motion is not yet like that of the bifurcation
+_FIRST, _LEAST, _CLOSER = 3e-3, 1e-6, 3.0
+#: cosine of the directions of two odd parts that are one, at least; distance from where a doubling is foretold at which
+#: it is found, as a share of the step that passes it, as of points of a curve
+_ALIKE, _FORETOLD = 0.5, 0.4
+#: halvings of a step towards the place at which the odd part vanishes: Newton's method does the rest
+_HALVED = 20
 #: share of a motion by which the first or last motion of a branch may differ from that of the bifurcation beside it
 _BESIDE = 0.02
 #: multipliers that differ by less (relative to moduli above one) are those of one neighbourhood
 _CLOSE = 0.02
-#: share of its odd part with which a step leaves a motion right beside its parent, on whose doublings what follows lies
-_VANISHED = 0.01
-#: odd part, in units of the motion, below which a curve may lead to its parent; distance of a multiplier from +1 up to
-#: which a motion cannot be told from those of other branches that leave a multiple bifurcation
-_LITTLE, MERGED = 0.3, 1e-6
-#: how far from where it is foretold the end of such a curve may lie, as a share of the way there
-_FORETOLD = 0.2
+#: distance of a multiplier from +1 up to which a motion cannot be told from those of other branches that leave a
+#: multiple bifurcation
+MERGED = 1e-6
 #: way in the scaled parameter that rounding may account for
 _STILL = 1e-10
 #: what a branch says where it could not look closer
+LOST = (
+    "the doubled part of the motions vanishes, but no period doubling of those of half the period could be solved for"
+)
 UNSEEN = "close to a bifurcation the motions change so fast that something may happen unseen"
 
 
@@ -145,12 +153,25 @@ def period_name(nu: int) -> str:
     return "T" if nu == 1 else f"{nu}T"
 
 
+def regular_point(point: CurvePoint) -> CurvePoint:
+    """A point of a curve as it is followed: one of doubled motions in coordinates blown up."""
+    curve = point.curve
+    regular = curve.regular(point.u) if isinstance(curve, DoubledMotions) else None
+    return point if regular is None else regular.blown_up_point(point)
+
+
+def passes_doubling(b: CurvePoint) -> bool:
+    """Whether the second of two neighbours lies behind the period doubling that a branch of doubled motions meets."""
+    return isinstance(b.curve, BlownUp) and float(b.u[b.curve.size_of_odd]) <= 0.0
+
+
 @dataclass(frozen=True)
 class Meeting:
     """A branch that meets its parent: the parent's period doubling, its curve, how the march ends.
 
     `doubt` says where between the last point and the parent something may happen unseen; empty if nowhere;
-    `multiplicity`: of the period doubling.
+    `multiplicity`: of the period doubling; `finer`: the branch with the harmonics that the doubling needs, where it has
+    fewer.
     """
 
     solution: Singular
@@ -158,94 +179,164 @@ class Meeting:
     arrival: Arrival
     doubt: str = ""
     multiplicity: int = 1
+    finer: DoubledMotions | None = None
 
 
 def meeting(a: CurvePoint, b: CurvePoint, newton: NewtonOptions) -> Meeting | None:
-    """The parent's period doubling that a curve passes between two neighbours, None if it passes none."""
+    """The parent's period doubling in which the odd part vanishes between two neighbours in coordinates blown up; None
+    if it is not solved for.
+    """
     curve = b.curve
-    assert isinstance(curve, MotionProblem)
-    basis = curve.balance.basis
-    if basis.nu % 2:
-        return None
-    odd_a, odd_b = _odd(curve.transfer(a.u, a.curve), curve, b.weights), _odd(b.u, curve, b.weights)
-    first, last = length(odd_a), length(odd_b)
-    turned = bool(odd_a @ odd_b < 0.0)
-    ahead = not turned and last > _VANISHED * first
-    if ahead and not (last < min(first, _LITTLE) and _merged(b)):
-        return None
-    parent = curve.with_basis(basis.halved)
-    share = first / (first - last if ahead else first + last)
-    u = between(a, b, share)
-    x, omega, values = curve.split(u)
-    half = basis.even_part(x)
+    assert isinstance(curve, BlownUp)
     try:
-        balance = parent.balance.settle(half, omega, values)
-        doubling, several = _doubling(Guess(balance.at(half, omega, values), curve.name, curve.span))
+        landed = _landed(a, b, newton)
+        doubling, several = _doubling_at(landed, curve)
     except ConvergenceError:
         return None
-    state = doubling.state
-    there = curve.transfer(parent.u_of(state), parent)
-    if ahead:
-        # beside a simple one motions are told apart as close as one likes: there is no need to end early
-        reached = several > 1 and length(b.weights * (there - u)) <= _FORETOLD * length(b.weights * (u - b.u))
+    motions, state, basis = curve.motions, doubling.state, curve.motions.balance.basis
+    parent = motions.with_basis(basis.halved).with_balance(state.balance)
+    finer = None if several > 1 else _finer(curve, landed, doubling)
+    if finer is None:
+        before, smooth = _last_before(a, landed, doubling, newton)
     else:
-        place = position(a, b, there)
-        reached = place is not None and -1e-6 <= place <= 1.0 + (1e-6 if turned else 2.0 * _VANISHED)
-    if not reached or doubling.vectors is None:
-        return None
-    reason = f"met the {period_name(basis.nu // 2)} motion at its period doubling at {curve.where(there)}"
-    if several > 1:
-        before, doubt = None, f"between {a.curve.where(a.u)} and {curve.where(there)}"
-    else:
-        before, doubt = _last_before(a, b, there, doubling, newton)
-    arrival = Arrival(before, Ending(EndReason.MET_BRANCH, curve.where(there), reason))
-    return Meeting(doubling, parent.with_balance(state.balance), arrival, doubt, several)
+        before, smooth = None, True
+    where = motions.where(motions.transfer(parent.u_of(state), parent))
+    from_ = motions.where(landed.u if before is None else before.u)
+    doubt = "" if smooth else f"between {from_} and {where}"
+    reason = f"met the {period_name(basis.nu // 2)} motion at its period doubling at {where}"
+    arrival = Arrival(before, Ending(EndReason.MET_BRANCH, where, reason))
+    return Meeting(doubling, parent, arrival, doubt, several, finer)
 
 
-def _merged(point: CurvePoint) -> bool:
-    """Whether a motion cannot be told from those of other branches that lead to the same place."""
-    assert isinstance(point.evaluation, MotionEvaluation)
-    return bool(np.abs(point.evaluation.floquet.multipliers - 1.0).min() < MERGED)
+def _landed(a: CurvePoint, b: CurvePoint, newton: NewtonOptions) -> CurvePoint:
+    """The point between two neighbours at which the odd part vanishes; ConvergenceError where it is not found."""
+    curve = b.curve
+    assert isinstance(curve, BlownUp)
+    at, low, high = curve.size_of_odd, 0.0, 1.0
+    for _ in range(_HALVED):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if between(a, b, middle)[at] > 0.0 else (low, middle)
+    guess = between(a, b, high)
+    guess[at] = 0.0
+    solved = correct(curve, guess, at, b.weights, newton)
+    if solved.distance > _FORETOLD * distance(b.u, curve.transfer(a.u, a.curve), b.weights):
+        raise ConvergenceError("what was found lies elsewhere")
+    return make_point(solved, b.tangent, a.arclength)
 
 
-def _doubling(guess: Guess) -> tuple[Singular, int]:
-    """The period doubling beside a motion, and how many fall together in it."""
-    away = np.abs(floquet_multipliers(guess.state).multipliers + 1.0)
+def _doubling_at(landed: CurvePoint, curve: BlownUp) -> tuple[Singular, int]:
+    """The parent's period doubling where the odd part vanishes, and how many fall together there."""
+    motions = curve.motions
+    x, omega, values = motions.split(curve.motion(landed.u))
+    basis = motions.balance.basis
+    half = basis.even_part(x)
+    balance = motions.with_basis(basis.halved).balance.settle(half, omega, values)
+    state = balance.at(half, omega, values)
+    guess = Guess(state, motions.name, motions.span)
+    away = np.abs(floquet_multipliers(state).multipliers + 1.0)
     several = int(np.count_nonzero(away <= 1.1 * away.min() + MERGED))
     if several > 1:
         with suppress(ConvergenceError):
             return locate_multiple(guess, Kind.HALF, several), several
-    return locate_singular(guess, Kind.HALF), 1
+    with suppress(ConvergenceError):
+        found = locate_singular(guess, Kind.HALF)
+        moved = motions.transfer(guess.vector(found.state), motions.with_balance(found.state.balance))
+        if length(curve.motions.weights(moved, 0.0) * (moved - curve.motion(landed.u))) <= _BESIDE:
+            return found, 1
+    # with one harmonic more than the branch has the parent's doubling may lie elsewhere
+    vectors = null_vectors(state, Kind.HALF)
+    return Singular(state, vectors, 0.0, landed.evaluation.error, landed.iterations), 1
 
 
-def _odd(u: Array, curve: MotionProblem, weights: Array) -> Array:
-    """The weighted coefficients of odd order."""
-    shaped = curve.balance.shaped((weights * u)[:-1])
-    return np.concatenate((shaped[1::4].ravel(), shaped[2::4].ravel()))
+def _finer(curve: BlownUp, landed: CurvePoint, doubling: Singular) -> DoubledMotions | None:
+    """The branch with as many harmonics as its parent's doubling is listed with; None where it has them."""
+    motions, rule = curve.motions, curve.motions.adaptive
+    if rule is None:
+        return None
+    wanted = choose_harmonics(doubling.state, rule, rule.event_tolerance).doubled
+    if wanted.size <= motions.balance.basis.size:
+        return None
+    assert isinstance(landed.evaluation, BlownUpEvaluation)
+    try:
+        finer = motions.finer(landed.evaluation.state, wanted)[0]
+    except ConvergenceError:
+        return None
+    assert isinstance(finer, DoubledMotions)
+    return finer
 
 
 def _last_before(
-    a: CurvePoint, b: CurvePoint, there: Array, doubling: Singular, newton: NewtonOptions
-) -> tuple[CurvePoint | None, str]:
-    """The curve's point right before it meets its parent, None if a neighbour is that; and what remains in doubt."""
-    curve = b.curve
-    assert isinstance(curve, MotionProblem)
-    before = curve.transfer(a.u, a.curve)
-    way = length(b.weights * (there - before))
-    direction = emanating(doubling, curve, b.weights)
-    if (b.weights * direction) @ (b.weights * (before - there)) < 0.0:
-        direction = -direction
+    a: CurvePoint, landed: CurvePoint, doubling: Singular, newton: NewtonOptions
+) -> tuple[CurvePoint | None, bool]:
+    """The branch's point right before it meets its parent, headed there, None if there is none behind another one; and
+    whether nothing else happens on the way from there.
+    """
     assert doubling.vectors is not None
-    form = normal_form("PD", doubling.state, doubling.vectors, curve.name)
+    curve = landed.curve
+    assert isinstance(curve, BlownUp)
+    form = normal_form("PD", doubling.state, doubling.vectors, curve.motions.name)
     # over twice the period
     multipliers = doubling.floquet.multipliers**2
-    close = beside(curve, there, direction, b.weights, multipliers, newton, curvature_of(form), 0.7 * way)
-    if close is None:
-        return None, f"between {a.curve.where(a.u)} and {curve.where(there)}"
-    point = close.point
-    arclength = a.arclength + length(b.weights * (point.u - before))
-    last = replace(point.turned, arclength=arclength)
-    return last, "" if close.smooth else f"between {curve.where(point.u)} and {curve.where(there)}"
+    close = beside_doubling(
+        curve, landed.u, landed.weights, multipliers, newton, curvature_of(form), 0.7 * float(a.u[-2])
+    )
+    return (None, False) if close is None else (close.point.turned, close.smooth)
+
+
+def leaving_doubling(
+    curve: DoubledMotions,
+    u: Array,
+    direction: Array,
+    multipliers: ComplexArray,
+    newton: NewtonOptions,
+    curvature: float | None,
+) -> Beside | None:
+    """The first point of the branch that leaves a period doubling, as `beside`.
+
+    u, `direction`: the parent's motion and the doubled null vector there, as vectors (X, free parameter).
+    """
+    blown_up = curve.blown_up
+    columns = curve.balance.column_weights
+    w = direction[:-1] / length(columns * direction[:-1])
+    start = np.concatenate((blown_up.joined(u[:-1], w, 1.0), [0.0, u[-1]]))
+    weights = blown_up.weights(start, 0.0)
+    with suppress(ConvergenceError):
+        start = correct(blown_up, start, blown_up.size_of_odd, weights, newton).u
+    return beside_doubling(blown_up, start, weights, multipliers, newton, curvature)
+
+
+def beside_doubling(
+    curve: BlownUp,
+    u: Array,
+    weights: Array,
+    multipliers: ComplexArray,
+    newton: NewtonOptions,
+    curvature: float | None,
+    most: float = np.inf,
+) -> Beside | None:
+    """The point of a branch right beside the period doubling at u that it leaves, headed away, with an odd part no
+    larger than `most`; None if there is none. Arguments and what is asked of it as of `beside`.
+    """
+    at, along = curve.size_of_odd, np.zeros(len(u))
+    along[at] = 1.0 / weights[at]
+    size = min(_FIRST / float(weights[at]), most)
+    columns = curve.motions.balance.column_weights**2
+    points: list[tuple[float, CurvePoint]] = []
+    while size * weights[at] >= _LEAST:
+        guess = u.copy()
+        guess[at] = size
+        size /= _CLOSER
+        try:
+            solved = correct(curve, guess, at, weights, newton)
+            if float((columns * u[:-2] * curve.odd) @ solved.u[:-2]) < _ALIKE:
+                continue
+            point = curve.plain_point(make_point(solved, along, 0.0), 0.0)
+        except ConvergenceError:
+            continue
+        points.append((size, point))
+        if len(points) > 1 and _near(points[-2][1], multipliers) and _parabolic(points[-2], points[-1], curvature):
+            return Beside(points[-2][1], True)
+    return Beside(points[-1][1], False) if points else None
 
 
 def emanating(doubling: Singular, curve: MotionProblem, weights: Array) -> Array:
@@ -274,27 +365,24 @@ def beside(
     multipliers: ComplexArray,
     newton: NewtonOptions,
     curvature: float | None = None,
-    reach: float = np.inf,
 ) -> Beside | None:
     """The curve's point close to a bifurcation in a direction, with its tangent pointing away; None if there is none.
 
     On the way the critical multiplier leaves +1, and the parameter its value, with the square of the distance. Where
     the point's multipliers are not those of the bifurcation, or the parameter goes another way, something else happens
-    in between: then one closer to it is taken, none farther than `reach`.
+    in between: then one closer to it is taken.
 
     u, `direction`: the bifurcation, and where the curve leaves it, of unit length in `weights`; `multipliers` of the
     motion there over the period of the curve's motions; `curvature`: which way the parameter goes, by its sign, where a
     normal form tells.
     """
     points: list[tuple[float, CurvePoint]] = []
-    for distance in _DISTANCES:
-        if distance > reach:
-            continue
+    for way in _DISTANCES:
         try:
-            point = _solved_beside(curve, u, distance * direction, weights, newton)
+            point = _solved_beside(curve, u, way * direction, weights, newton)
         except ConvergenceError:
             continue
-        points.append((distance, point))
+        points.append((way, point))
         if len(points) > 1 and _near(points[-2][1], multipliers) and _parabolic(points[-2], points[-1], curvature):
             return Beside(points[-2][1], True)
     return Beside(points[-1][1], False) if points else None

@@ -29,6 +29,7 @@ from suboctave.continuation.march import March, SteppingOptions
 from suboctave.continuation.newton import NewtonOptions, correct, null_row
 from suboctave.continuation.point import CurvePoint, make_point
 from suboctave.continuation.problem import Array
+from suboctave.curves.blow_up import DoubledMotions
 from suboctave.curves.floating import Floating, unheld
 from suboctave.curves.motion import LEAST, MotionEvaluation, MotionProblem
 from suboctave.errors import ConvergenceError, InputError, NotFiniteError
@@ -79,7 +80,8 @@ def make_curve(
         )
     basis = HarmonicBasis(high * nu, nu)
     check_unknowns(linear.size, basis)
-    return MotionProblem.response(HarmonicBalance(system, basis, linear=linear), name, omega, span, adaptive)
+    curve = MotionProblem if nu % 2 else DoubledMotions
+    return curve.response(HarmonicBalance(system, basis, linear=linear), name, omega, span, adaptive)
 
 
 def rule_of(harmonics: Any) -> AdaptiveHarmonics | int:

@@ -30,6 +30,9 @@ _MOST_UNKNOWNS = 4000
 _LADDER = (3, 5, 7, 9, 11, 13, 15, 19, 23, 27, 31, 39, 47, 55, 63, 79, 95, 111, 127, 159, 191, 223, 255)
 #: ratio of neighbouring highest harmonics for sub-harmonic motions, whose steps need not be whole multiples of omega
 _FINER = 1.05
+#: share of a class of harmonics in the motion below which what is neglected of it counts as if it had that share, and
+#: that below which there is none
+_OWN, _NONE = 0.01, 1e-9
 #: share of the tolerance that a new choice for sub-harmonic motions aims at
 _AIM = 0.6
 
@@ -163,8 +166,8 @@ def _of_subharmonics(state: BalanceState, options: AdaptiveHarmonics, tolerance:
 
 
 def _class_tails(state: BalanceState) -> Array | None:
-    """What each class of harmonics has beyond k = 0 .. 2 H + 1 relative to the motion, (classes, 2 H + 2); None at
-    rest.
+    """What each class of harmonics has beyond k = 0 .. 2 H + 1 relative to the motion, (classes, 2 H + 2), or of a small
+    one relative to itself; None at rest.
     """
     nu, squares = state.basis.nu, state.squares
     size = float(squares[: state.basis.harmonics + 1].sum())
@@ -174,7 +177,10 @@ def _class_tails(state: BalanceState) -> Array | None:
     classes = np.array([np.where(divisor == d, squares, 0.0) for d in range(1, nu + 1) if nu % d == 0])
     sums = np.cumsum(classes[:, ::-1], axis=1)[:, ::-1] / size
     tails: Array = np.sqrt(np.column_stack((sums[:, 1:], np.zeros(len(sums)))))
-    return tails
+    shares = np.sqrt(classes[:, : state.basis.harmonics + 1].sum(axis=1) / size)
+    # what decides where a class is born is what it lacks of itself
+    weights = np.where(shares > _NONE, np.maximum(1.0, _OWN / np.maximum(shares, _NONE)), 1.0)
+    return tails * weights[:, None]
 
 
 def _needed(beyond: Array, total: Array, high: int, bound: float, rungs: tuple[int, ...]) -> int:
