@@ -475,11 +475,12 @@ def _closest(item: Bifurcation, curve: MotionProblem, u: Array, direction: Array
     weights = curve.weights(u, 0.0)
     # over the period of the branch
     expected = item.floquet.multipliers ** (2 if item.kind == "PD" else 1)
-    leads = curvature_of(item.normal_form)
+    leads = None
     if item.kind == "PD":
         assert isinstance(curve, DoubledMotions)
-        close = leaving_doubling(curve, u, direction, expected, settings.newton, leads)
+        close = leaving_doubling(curve, u, direction, expected, settings.newton)
     else:
+        leads = curvature_of(item.normal_form)
         close = beside(curve, u, direction / length(weights * direction), weights, expected, settings.newton, leads)
     if close is None:
         raise ConvergenceError(

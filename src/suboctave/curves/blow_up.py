@@ -34,7 +34,7 @@ from suboctave.lazy import lazy
 #: part is that large: closer to the doubling rounding would be divided by it
 _DIFFERENCE = 1e-6
 #: odd part, as a share of the motion, that counts as none
-_NONE = 1e-9
+_NONE = 1e-7
 #: odd part, as a share of the motion, below which its own equations are solved less closely than the others: to the
 #: same force
 _SHARE = 0.1

@@ -19,7 +19,7 @@ import numpy as np
 
 from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.bifurcation.bordered import doubled_direction, null_vectors
-from suboctave.bifurcation.normal_form import NormalForm, normal_form
+from suboctave.bifurcation.normal_form import NormalForm
 from suboctave.continuation.ending import Ending, EndReason
 from suboctave.continuation.linear import distance, length
 from suboctave.continuation.march import Arrival
@@ -88,6 +88,8 @@ _DISTANCES = (3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6)
 #: odd part, in units of the motion, of the first and last motions of a branch of doubled motions, and the least to
 #: which it is divided by the third number while the motion is not yet like that of the bifurcation
 _FIRST, _LEAST, _CLOSER = 3e-3, 1e-6, 3.0
+#: by how much the ratio of the parameter's way to the square of the odd part may change from one of them to the next
+_BENT = 0.05
 #: cosine of the directions of two odd parts that are one, at least; distance from where a doubling is foretold at which
 #: it is found, as a share of the step that passes it, as of points of a curve
 _ALIKE, _FORETOLD = 0.5, 0.4
@@ -271,15 +273,11 @@ def _last_before(
     """The branch's point right before it meets its parent, headed there, None if there is none behind another one; and
     whether nothing else happens on the way from there.
     """
-    assert doubling.vectors is not None
     curve = landed.curve
     assert isinstance(curve, BlownUp)
-    form = normal_form("PD", doubling.state, doubling.vectors, curve.motions.name)
     # over twice the period
     multipliers = doubling.floquet.multipliers**2
-    close = beside_doubling(
-        curve, landed.u, landed.weights, multipliers, newton, curvature_of(form), 0.7 * float(a.u[-2])
-    )
+    close = beside_doubling(curve, landed.u, landed.weights, multipliers, newton, 0.7 * float(a.u[-2]))
     return (None, False) if close is None else (close.point.turned, close.smooth)
 
 
@@ -289,7 +287,6 @@ def leaving_doubling(
     direction: Array,
     multipliers: ComplexArray,
     newton: NewtonOptions,
-    curvature: float | None,
 ) -> Beside | None:
     """The first point of the branch that leaves a period doubling, as `beside`.
 
@@ -302,41 +299,42 @@ def leaving_doubling(
     weights = blown_up.weights(start, 0.0)
     with suppress(ConvergenceError):
         start = correct(blown_up, start, blown_up.size_of_odd, weights, newton).u
-    return beside_doubling(blown_up, start, weights, multipliers, newton, curvature)
+    return beside_doubling(blown_up, start, weights, multipliers, newton)
 
 
 def beside_doubling(
-    curve: BlownUp,
-    u: Array,
-    weights: Array,
-    multipliers: ComplexArray,
-    newton: NewtonOptions,
-    curvature: float | None,
-    most: float = np.inf,
+    curve: BlownUp, u: Array, weights: Array, multipliers: ComplexArray, newton: NewtonOptions, most: float = np.inf
 ) -> Beside | None:
-    """The point of a branch right beside the period doubling at u that it leaves, headed away, with an odd part no
-    larger than `most`; None if there is none. Arguments and what is asked of it as of `beside`.
+    """The point of a branch right beside the period doubling at u that it leaves, headed away; None if there is none.
+
+    With the size eps of the odd part the parameter moves like `c eps^2`, and multipliers leave those of the doubling.
+    The odd part is divided until this is so: where it is not something else happens on the way.
+
+    `multipliers` of the parent's motion over the period of the curve's; `most`: the largest odd part.
     """
     at, along = curve.size_of_odd, np.zeros(len(u))
     along[at] = 1.0 / weights[at]
     size = min(_FIRST / float(weights[at]), most)
-    columns = curve.motions.balance.column_weights**2
-    points: list[tuple[float, CurvePoint]] = []
+    columns = np.where(curve.odd, curve.motions.balance.column_weights**2, 0.0)
+    points: list[tuple[CurvePoint, float]] = []
     while size * weights[at] >= _LEAST:
-        guess = u.copy()
-        guess[at] = size
+        guess, tried = u.copy(), size
+        guess[at] = tried
         size /= _CLOSER
         try:
             solved = correct(curve, guess, at, weights, newton)
-            if float((columns * u[:-2] * curve.odd) @ solved.u[:-2]) < _ALIKE:
-                continue
             point = curve.plain_point(make_point(solved, along, 0.0), 0.0)
         except ConvergenceError:
             continue
-        points.append((size, point))
-        if len(points) > 1 and _near(points[-2][1], multipliers) and _parabolic(points[-2], points[-1], curvature):
-            return Beside(points[-2][1], True)
-    return Beside(points[-1][1], False) if points else None
+        if float((columns * u[:-2]) @ solved.u[:-2]) < _ALIKE:
+            continue
+        moved = float(weights[-1] * (solved.u[-1] - u[-1]))
+        points.append((point, 0.0 if abs(moved) <= _STILL else moved / tried**2))
+        if len(points) > 1:
+            (before, one), (_, other) = points[-2:]
+            if _near(before, multipliers) and abs(one - other) <= _BENT * abs(other):
+                return Beside(before, True)
+    return Beside(points[-1][0], False) if points else None
 
 
 def emanating(doubling: Singular, curve: MotionProblem, weights: Array) -> Array:

@@ -166,7 +166,7 @@ def _of_subharmonics(state: BalanceState, options: AdaptiveHarmonics, tolerance:
 
 
 def _class_tails(state: BalanceState) -> Array | None:
-    """What each class of harmonics has beyond k = 0 .. 2 H + 1 relative to the motion, (classes, 2 H + 2), or of a small
+    """What each class of harmonics has beyond k = 0 .. 2 H + 1 relative to the motion, (classes, 2 H + 2), of a small
     one relative to itself; None at rest.
     """
     nu, squares = state.basis.nu, state.squares
