@@ -1,6 +1,6 @@
 """Do branches of doubled motions arrive where they should? Random systems, every doubling of the response switched at.
 
-A branch that leaves the response at a period doubling comes back to it at another one, leaves the range, or closes. If it
+A branch that leaves the response at a period doubling comes back to it at another one, or leaves the range. If it
 arrives, the branch that leaves the other doubling is the same curve walked the other way: the same range of omega, the
 same limit points, the same motions. Systems are those of `random_systems.py`, of even seeds with strong loads.
 
@@ -33,6 +33,7 @@ from threadpoolctl import threadpool_limits
 import suboctave as so
 from suboctave.continuation.ending import EndReason
 from suboctave.curves.identity import apart, lies_on
+from suboctave.curves.trace import BranchPoint
 
 #: distance of two doublings that are one: in omega, as a share of the range, and of their motions
 PLACE, ALIKE = 1e-4, 0.02
@@ -47,7 +48,7 @@ STOPPED = (EndReason.INTERRUPTED, EndReason.TIME_LIMIT)
 
 @dataclass
 class Doubled:
-    """A branch of doubled motions: the doublings that it leaves and meets, by number, None where it meets none listed."""
+    """A branch of doubled motions: which doublings it leaves and meets, None where it meets none that is listed."""
 
     start: int
     branch: so.Branch
@@ -118,7 +119,9 @@ def elsewhere(item: Doubled) -> Iterator[str]:
     if item.end is not None:
         return
     last = item.branch.arrives
-    yield f"arrives at {last.omega:.9g}, which the response does not list"
+    found = so.verify(item.branch.orbits[-1])
+    critical = float(np.abs(found.multipliers - 1.0).min())
+    yield f"arrives at {last.omega:.9g}, not listed (by shooting a multiplier is {critical:.1e} from +1 there)"
 
 
 def false_ones(branch: so.Branch, mirrored: bool) -> list[float]:
@@ -142,24 +145,24 @@ def both_ends(branches: list[Doubled], doublings: list[so.Bifurcation], width: f
         if back.end != item.start:
             yield f"one way    {name}: back it {back.branch.ended}"
         elif item.start < back.start:
-            yield from (f"other      {name}: {text}" for text in differences(item.branch, back.branch, width))
+            tips = [doublings[i].orbit for i in (item.start, item.end)]
+            yield from (f"other      {name}: {text}" for text in differences(item.branch, back.branch, tips, width))
 
 
-def differences(one: so.Branch, other: so.Branch, width: float) -> Iterator[str]:
-    """How two curves differ that should be one."""
+def differences(one: so.Branch, other: so.Branch, tips: list[so.PeriodicOrbit], width: float) -> Iterator[str]:
+    """How two curves differ that should be one; `tips`: the motions at their ends, in the order of the first."""
     for a, b in zip(extent(one), extent(other), strict=True):
         if abs(a - b) > 1e-3 * width:
             yield f"omega reaches {a:.9g} and {b:.9g}"
-    ends = [item.bifurcations["LP"] for item in (one, other)]
-    folds = [[item.omega for item in found] for found in ends]
+    folds = [[item.omega for item in branch.bifurcations["LP"]] for branch in (one, other)]
     if len(folds[0]) != len(folds[1]):
-        yield f"limit points {' '.join(f'{f:.7g}' for f in folds[0])} and {' '.join(f'{f:.7g}' for f in folds[1])}"
-    for a, b in ((one, other), (other, one)):
-        # the last motions of one may lie beyond those of the other
-        at = np.unique(np.linspace(2, len(a.points) - 3, SAMPLES).astype(int)) if len(a.points) > 8 else []
-        lost = [a.omega[i] for i in at if not lies_on(a.orbits[i], b.points)]
+        yield f"limit points {' '.join(f'{f:.9g}' for f in folds[0])} and {' '.join(f'{f:.9g}' for f in folds[1])}"
+    first, last = (BranchPoint(tip, None, 0.0, 0) for tip in tips)
+    for a, b, ends in ((one, other, (last, first)), (other, one, (first, last))):
+        at = np.unique(np.linspace(0, len(a.points) - 1, SAMPLES).astype(int))
+        lost = [a.omega[i] for i in at if not lies_on(a.orbits[i], [ends[0], *b.points, ends[1]])]
         if lost:
-            yield "motions of one are not on the other at omega " + " ".join(f"{value:.6g}" for value in lost)
+            yield "motions of one are not on the other at omega " + " ".join(f"{value:.9g}" for value in lost)
 
 
 def extent(branch: so.Branch) -> tuple[float, float]:

@@ -29,6 +29,7 @@ from suboctave.curves.junction import (
     UNSEEN,
     Beside,
     beside,
+    between_values,
     curvature_of,
     emanating,
     leaving_doubling,
@@ -465,8 +466,7 @@ def _away(
     else:
         close = _closest(item, curve, u, direction, settings)
     if not close.smooth:
-        own = close.point.curve
-        notes.append(f"between {curve.where(u)} and {own.where(close.point.u)}: {UNSEEN}")
+        notes.append(f"{between_values(curve.name, float(u[-1]), close.point.parameter)}: {UNSEEN}")
     return close.point
 
 

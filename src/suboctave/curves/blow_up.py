@@ -20,6 +20,7 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from suboctave.continuation.linear import distance, length
 from suboctave.continuation.newton import NewtonOptions, correct, factorised
@@ -148,7 +149,7 @@ class BlownUp:
     """The curve of doubled motions in these coordinates; `motions`: as it stands."""
 
     motions: DoubledMotions
-    odd: Array = field(init=False)
+    odd: NDArray[np.bool_] = field(init=False)
 
     def __post_init__(self) -> None:
         balance = self.motions.balance
@@ -343,7 +344,7 @@ class BlownUp:
 
 
 @lru_cache(maxsize=64)
-def _odd(harmonics: int, size: int) -> Array:
+def _odd(harmonics: int, size: int) -> NDArray[np.bool_]:
     """Which of the coefficients, (dimension,), are of odd order."""
     orders = np.append(0, np.repeat(np.arange(1, harmonics + 1), 2))
     return np.repeat(orders % 2 == 1, size)

@@ -150,6 +150,11 @@ class Junction:
         return f"the {self.kind} of the {period_name(self.nu)} motion at omega = {self.omega:.9g}"
 
 
+def between_values(name: str, first: float, last: float) -> str:
+    """Where on a curve, in words: two places right beside each other differ in late digits."""
+    return f"between {name} = {first:.9g} and {last:.9g}"
+
+
 def period_name(nu: int) -> str:
     """T, 2T, 4T, ..."""
     return "T" if nu == 1 else f"{nu}T"
@@ -202,9 +207,10 @@ def meeting(a: CurvePoint, b: CurvePoint, newton: NewtonOptions) -> Meeting | No
         before, smooth = _last_before(a, landed, doubling, newton)
     else:
         before, smooth = None, True
-    where = motions.where(motions.transfer(parent.u_of(state), parent))
-    from_ = motions.where(landed.u if before is None else before.u)
-    doubt = "" if smooth else f"between {from_} and {where}"
+    there = motions.transfer(parent.u_of(state), parent)
+    where = motions.where(there)
+    ends = [float((a if before is None else before).u[-1]), float(there[-1])]
+    doubt = "" if smooth else between_values(motions.name, *ends)
     reason = f"met the {period_name(basis.nu // 2)} motion at its period doubling at {where}"
     arrival = Arrival(before, Ending(EndReason.MET_BRANCH, where, reason))
     return Meeting(doubling, parent, arrival, doubt, several, finer)
