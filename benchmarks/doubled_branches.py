@@ -13,7 +13,7 @@ close, or were stopped; then, in lines of their own, what does not hold:
     other       switched at both ends the two curves differ
     false BP    a branch point where the system has no symmetry, or where the motion is its parent
 
-    python benchmarks/doubled_branches.py [--seeds 1000:1020] [--seconds 60] [--verbose]
+    python benchmarks/doubled_branches.py [--seeds 1000:1020] [--masses 4] [--seconds 60] [--verbose]
 """
 
 from __future__ import annotations
@@ -175,6 +175,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--seeds", default="1000:1020", help="first:last but one, or several, 3,7,10:20")
     parser.add_argument("--systems", type=int, default=None, help="stop after as many systems with doublings")
+    parser.add_argument("--masses", type=int, default=4, help="leave out systems of more")
     parser.add_argument("--seconds", type=float, default=60.0, help="for one branch")
     parser.add_argument("--verbose", action="store_true", help="print every branch and its warnings")
     options = parser.parse_args()
@@ -182,6 +183,7 @@ def main() -> int:
     for part in options.seeds.split(","):
         first, _, last = part.partition(":")
         seeds += range(int(first), int(last) if last else int(first) + 1)
+    seeds = [seed for seed in seeds if len(describe(seed)["mass"]) <= options.masses]
     print(f"{'seed':>5}  {'system':<38}{'PD':>4}{'arrive':>8}{'leave':>7}{'close':>7}{'stop':>6}{'notes':>7}{'s':>7}")
     total: Counter[str] = Counter()
     kinds: Counter[str] = Counter()

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -35,7 +35,7 @@ from suboctave.floquet.monodromy import floquet_multipliers
 from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.perturbation import Kind
-from suboctave.harmonic.truncation import choose_harmonics
+from suboctave.harmonic.truncation import choose_harmonics, most_harmonics
 
 #: sub-harmonic share of a motion that is none any more
 NOTHING_LEFT = 1e-5
@@ -261,10 +261,11 @@ def _finer(curve: BlownUp, landed: CurvePoint, doubling: Singular) -> DoubledMot
     motions, rule = curve.motions, curve.motions.adaptive
     if rule is None:
         return None
+    assert isinstance(landed.evaluation, BlownUpEvaluation)
     wanted = choose_harmonics(doubling.state, rule, rule.event_tolerance).doubled
+    wanted = replace(wanted, harmonics=min(wanted.harmonics, most_harmonics(landed.evaluation.state, rule)))
     if wanted.size <= motions.balance.basis.size:
         return None
-    assert isinstance(landed.evaluation, BlownUpEvaluation)
     try:
         finer = motions.finer(landed.evaluation.state, wanted)[0]
     except ConvergenceError:

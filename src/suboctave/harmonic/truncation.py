@@ -83,6 +83,11 @@ def _limits(options: AdaptiveHarmonics, state: BalanceState) -> tuple[int, float
     return max(options.minimum, balance.highest_load), max(basis.harmonics / basis.nu, min(options.maximum, affordable))
 
 
+def most_harmonics(state: BalanceState, options: AdaptiveHarmonics) -> int:
+    """Most multiples of the base frequency that may be chosen for a motion."""
+    return int(_limits(options, state)[1] * state.basis.nu)
+
+
 @lru_cache(maxsize=256)
 def _rungs(lowest: int, most: float, otherwise: int) -> tuple[int, ...]:
     """Numbers of harmonics of omega to choose from."""
