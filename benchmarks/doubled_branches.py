@@ -120,7 +120,7 @@ def elsewhere(item: Doubled) -> Iterator[str]:
         return
     last = item.branch.arrives
     found = so.verify(item.branch.orbits[-1])
-    critical = float(np.abs(found.multipliers - 1.0).min())
+    critical = np.inf if found.solution is None else float(np.abs(found.solution.multipliers - 1.0).min())
     yield f"arrives at {last.omega:.9g}, not listed (by shooting a multiplier is {critical:.1e} from +1 there)"
 
 
