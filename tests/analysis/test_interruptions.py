@@ -10,6 +10,7 @@ import pytest
 
 import suboctave as so
 from suboctave import interruption
+from suboctave.analysis import phase_resonance as resonance
 from suboctave.continuation.ending import Ending, EndReason, interruption_of, read_endings, sentence
 from suboctave.curves import follow as follow_module
 from suboctave.errors import ConvergenceError
@@ -312,6 +313,36 @@ def test_a_search_for_subharmonics_gives_the_branches_that_it_has(ticks):
     found = search(0.7 * looks)
     assert found
     assert found.interruption == Interruption(0.7 * looks)
+
+
+@pytest.mark.parametrize(("order", "reach"), [(1, (0.7, 6.0)), (3, (4.0, 9.0))])
+def test_a_resonance_is_not_read_off_a_part_of_a_response(order, reach, ticks, monkeypatch):
+    """Neither after a time limit nor after Ctrl-C: the peak may lie on what is missing."""
+    system = so.System(
+        1.0, 0.02, 1.0, [so.PolynomialSpring(0, {3: 1.0})], [so.HarmonicLoad(0, "F")], parameters={"F": 4.0}
+    )
+    stage = "frequency_response" if order == 1 else "find_subharmonics"
+    verb, more = getattr(so, stage), {} if order == 1 else {"seeds": so.Seeds(4, 3, 1)}
+
+    def response(seconds):
+        return verb(system, reach, *([] if order == 1 else [order]), harmonics=3, seconds=seconds, **more)
+
+    looks = ticks.of(response)
+    for share in (0.8, 0.95):
+        ticks.now = 0.0
+        assert response(share * looks).interrupted if order == 1 else response(share * looks).interruption
+
+    def part(*given, **options):
+        return verb(*given, **options, **more, progress=Stop(8))
+
+    monkeypatch.setattr(resonance, stage, lambda *given, **options: verb(*given, **options, **more))
+    for share in (0.8, 0.95):
+        ticks.now = 0.0
+        with pytest.raises(so.TimeLimitError, match="before there was a result to keep"):
+            so.phase_resonance(system, "F", (1.0, 4.0), omega=reach, order=order, harmonics=3, seconds=share * looks)
+    monkeypatch.setattr(resonance, stage, part)
+    with pytest.raises(KeyboardInterrupt):
+        so.phase_resonance(system, "F", (1.0, 4.0), omega=reach, order=order, harmonics=3)
 
 
 # ------------------------------------------------------------------------------------------ starts, progress and turns

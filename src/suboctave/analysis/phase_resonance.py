@@ -7,7 +7,6 @@ largest amplitude of that harmonic.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from math import gcd
 from typing import Unpack
 
@@ -22,6 +21,7 @@ from suboctave.curves.trace import BranchPoint
 from suboctave.errors import ConvergenceError, InputError
 from suboctave.harmonic.basis import Array
 from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.interruption import pass_on
 from suboctave.model.inputs import check_bounds, check_count, check_is_system, check_range, timed
 from suboctave.model.system import System
 from suboctave.options import with_options
@@ -80,11 +80,14 @@ def phase_resonance(
         raise InputError(f"the phase is that of a single load at omega: this system has {shown}")
     plain = handed_on(options)
     plain.pop("formulation", None)
-    branches: Iterable[Branch] = (
-        [frequency_response(system, omega, harmonics, **plain)]
+    given = (
+        frequency_response(system, omega, harmonics, **plain)
         if nu == 1
         else find_subharmonics(system, omega, nu, harmonics, **plain)
     )
+    # the resonance may lie on what is missing
+    pass_on(given.interruption)
+    branches = [given] if isinstance(given, Branch) else given
     found = [place for branch in branches for place in _in_quadrature(branch, k, nu)]
     if not found:
         raise ConvergenceError(

@@ -18,7 +18,7 @@ from suboctave.continuation.ending import Ending, EndReason
 from suboctave.curves.junction import period_name
 from suboctave.curves.trace import TrackedPoint
 from suboctave.errors import ConvergenceError, InputError, is_number, suggest
-from suboctave.interruption import Interruption, limited
+from suboctave.interruption import Interruption, limited, pass_on
 from suboctave.maps.catalogue import SearchRange, branch_through, checked_values
 from suboctave.maps.pieces import MonotonePiece, stable_ranges
 from suboctave.model.system import System
@@ -41,6 +41,9 @@ class IsolaEnd(TrackedEvent, float):
 
     `kind` is "isola_centre" (the closed branch shrinks to a point) or "isola_merging" (it joins another branch). As any
     extremum along a curve of bifurcations it can be tracked in a third parameter.
+
+    It counts as true at every value, 0 among them: an end that is not known is None. Two ends are equal if they are one
+    place, of one kind.
     """
 
     def __new__(cls, *positional: Any, **named: Any) -> IsolaEnd:
@@ -56,7 +59,23 @@ class IsolaEnd(TrackedEvent, float):
         given = {f.name: getattr(event, f.name) for f in fields(event)}
         return cls(**{**given, "kind": "isola_centre" if centre else "isola_merging", "parameter_name": name})
 
+    def __bool__(self) -> bool:
+        return True
+
+    def __eq__(self, other: object) -> bool:
+        if isinstance(other, IsolaEnd):
+            return self._place == other._place
+        return float.__eq__(self, other)  # type: ignore[operator]
+
+    def __ne__(self, other: object) -> bool:
+        return not self == other
+
+    # as of the number, which an end equals
     __hash__ = float.__hash__
+
+    @property
+    def _place(self) -> tuple[str, str, float, float]:
+        return self.kind, self.parameter_name, float(self), self.omega
 
     def __repr__(self) -> str:
         return f"{self.kind} at {self.parameter_name} = {float(self):.9g}, omega = {self.omega:.9g}"
@@ -168,7 +187,9 @@ class Isola:
 
     def stable_ranges(self, value: float) -> list[tuple[float, float]]:
         """Between which frequencies there are stable motions on the closed branch at a value; pairs of omega."""
-        return stable_ranges(self.at(value))
+        branch = self.at(value)
+        pass_on(branch.interruption)
+        return stable_ranges(branch)
 
     def plot(self, path: Any = None, values: int | Sequence[float] = 5, responses: Any = (), **options: Any) -> Any:
         """Draw it in space: the surface of its closed branches, its limit points, its birth.
@@ -189,7 +210,10 @@ class Isola:
         places, (low, high) = checked_values("values", values, self.range), self.range
         if isinstance(places, int):
             places = np.linspace(low + 0.02 * (high - low), high - 0.08 * (high - low), places).tolist()
-        drawn = replace(self, followed={value: self.at(value) for value in places})
+        closed = {value: self.at(value) for value in places}
+        for branch in closed.values():
+            pass_on(branch.interruption)
+        drawn = replace(self, followed=closed)
         alone = Isolas([drawn], self.system, self.parameter, self.range, self.omega, [self.limit_points, *self.further])
         given = list(responses) if isinstance(responses, list | tuple) else [responses]
         return plot_space([*alone.to_xarray().values(), *given], path, **options)
