@@ -33,6 +33,7 @@ from suboctave.harmonic.evaluation import BalanceState, HarmonicBalance
 from suboctave.harmonic.finite import unbounded_along, unbounded_between
 from suboctave.harmonic.truncation import (
     AdaptiveHarmonics,
+    beyond_usual,
     choose_harmonics,
     motion_size,
     next_harmonics,
@@ -45,6 +46,8 @@ _REST = 1e-8
 #: distance of the critical multiplier from the unit circle, and error of one that may lie on it, up to which harmonics
 #: suffice
 CRITICAL = 1e-3
+#: neglected motion in units of the tolerance above which a curve takes more harmonics than it has as a rule
+_TOO_FEW = 10.0
 #: steps after which that distance is computed again
 CRITICAL_EVERY = 5
 #: share of the largest motion met, or of the reference, that is the unit of motions below it
@@ -362,11 +365,19 @@ class MotionProblem:
         lower = basis.harmonics < present.harmonics
         if lower and self.erred > 0.0 and evaluation.floquet.clearance <= self.erred:
             return present
+        if basis.harmonics <= present.harmonics and self._far_from_enough(evaluation, adaptive):
+            basis = beyond_usual(state, adaptive)
         if basis.harmonics > present.harmonics or not (lower or self.steps % CRITICAL_EVERY == 0):
             return basis
         if evaluation.doubt > CRITICAL:
             return next_harmonics(state, adaptive)
         return present if lower and evaluation.doubt > 0.1 * CRITICAL else basis
+
+    def _far_from_enough(self, evaluation: MotionEvaluation, adaptive: AdaptiveHarmonics) -> bool:
+        """Whether as many harmonics as there may be as a rule leave out so much that the equations may have motions
+        that do not exist.
+        """
+        return evaluation.truncation > _TOO_FEW * adaptive.tolerance
 
     def _in_basis(self, basis: HarmonicBasis) -> HarmonicBalance:
         if basis is self.balance.basis or basis == self.balance.basis:

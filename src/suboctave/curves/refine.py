@@ -12,6 +12,7 @@ from suboctave.bifurcation.bordered import branching_equation
 from suboctave.continuation import NewtonOptions
 from suboctave.continuation.linear import distance, length
 from suboctave.continuation.point import solved_again
+from suboctave.curves.events.beyond import lacks_harmonics, resolved
 from suboctave.curves.events.layer import (
     behind_grazing,
     grazing_beside,
@@ -26,15 +27,20 @@ from suboctave.curves.motion import MotionProblem
 from suboctave.curves.sample import Sample
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.orbit import PeriodicOrbit
-from suboctave.harmonic.truncation import choose_harmonics, next_harmonics, truncation
+from suboctave.harmonic.truncation import beyond_usual, choose_harmonics, next_harmonics, truncation
 
 #: distance of a located bifurcation's critical multiplier from the unit circle up to which its harmonics suffice
 _CRITICAL = 1e-3
 _NEWTON = NewtonOptions()
+#: how many times the distance of a bifurcation from where it lies with more harmonics is stated: they leave out less,
+#: but not nothing
+_COVERED = 1.2
 #: halvings of a step in which a bifurcation is looked for with more harmonics
 _HALVED = 16
 #: fractions of a step beyond its ends up to which more harmonics may move a bifurcation located in it
 _MOVED = 0.05
+#: move of a bifurcation by more harmonics, as a share of its parameter's value or range, that is not trusted
+_FAR = 0.05
 #: component of the unit tangent along the parameter, in scaled arclength, at both ends of the shortest interval, from
 #: which on a curve that turns in between does so in a corner: a smooth limit point would be bent by 1e3
 _ABRUPT = 1e-2
@@ -95,11 +101,38 @@ def bifurcation_at(located: Located, a: Sample, b: Sample, observe: int, warning
     item = solved_bifurcation(located.kind, solution, curve, observe, warnings, arclength, unit, (a, b))
     if located.width > item.uncertainty:
         item = replace(item, uncertainty=located.width)
+    known = with_what_harmonics_move(located, item, a, b, warnings)
+    if known is None:
+        return None
+    item = known
     if item.kind != "BP":
         return item
     share = located.fraction
     tangent = (1.0 - share) * curve.transfer(a.point.tangent, a.curve) + share * b.point.tangent
     return replace(item, tangent=tuple(curve.with_balance(item.orbit.balance).transfer(tangent, curve).tolist()))
+
+
+def with_what_harmonics_move(
+    located: Located, item: Bifurcation, a: Sample, b: Sample, warnings: list[str]
+) -> Bifurcation | None:
+    """A bifurcation solved for between two samples with the uncertainty that the harmonics left out make, where they
+    are too few: the distance from where it lies with more of them. None if there is none with more.
+    """
+    kind, curve, state = located.kind, b.curve, item.orbit.state()
+    solution = Singular(state, item.null_vectors, item.kappa, item.residual, 0)
+    # beside a grazing it is stated already, and the curve with more harmonics is no smoother there
+    if item.contact is not None or not lacks_harmonics(kind, solution, curve):
+        return item
+    own, share = curve.with_balance(state.balance), located.fraction
+    tangent = (1.0 - share) * own.transfer(a.point.tangent, a.curve) + share * own.transfer(b.point.tangent, b.curve)
+    try:
+        finer = resolved(kind, solution, own, tangent)
+    except ConvergenceError:
+        finer = None
+    if finer is None:
+        return None
+    moved = abs(item.parameter(curve.name) - finer.parameter)
+    return replace(item, floquet=finer.floquet, uncertainty=max(item.uncertainty, _COVERED * moved))
 
 
 def _corner(kind: BifurcationKind, a: Sample, b: Sample) -> tuple[Sample, float] | None:
@@ -222,14 +255,16 @@ def _refined(
     if adaptive is None:
         return solution, coarser
     for _ in range(8):
-        state = solution.state
+        state, here = solution.state, _guess_from(solution, curve).parameter
         basis = choose_harmonics(state, adaptive, adaptive.event_tolerance)
         if basis.size <= state.basis.size:
             # a small neglected motion may still matter (a stiff contact just closed): the critical multiplier tells
             critical = kind.critical(solution)
             if critical is None or np.abs(solution.floquet.multipliers - critical).min() <= _CRITICAL:
-                break
-            basis = next_harmonics(state, adaptive)
+                basis = beyond_usual(state, adaptive, one=True)
+            else:
+                basis = next_harmonics(state, adaptive)
+                basis = basis if basis.size > state.basis.size else beyond_usual(state, adaptive, one=True)
         if basis.size <= state.basis.size:
             break
         try:
@@ -247,18 +282,18 @@ def _refined(
                 better = behind or better
         except ConvergenceError as failure:
             warnings.append(
-                f"{kind.name} near omega = {state.omega:.6g} was located with {state.basis.harmonics} "
+                f"{kind.name} near {curve.name} = {here:.6g} was located with {state.basis.harmonics} "
                 f"harmonics; with {basis.harmonics} it was not found again ({failure})"
             )
             break
-        moved = abs(better.state.omega - state.omega) / state.omega
-        if moved > 0.05:
+        moved = abs(_guess_from(better, curve).parameter - here) / max(abs(here), curve.span)
+        if moved > _FAR:
             warnings.append(
-                f"{kind.name} near omega = {state.omega:.6g} moves by {moved:.1%} with {basis.harmonics} "
+                f"{kind.name} near {curve.name} = {here:.6g} moves by {moved:.1%} with {basis.harmonics} "
                 f"harmonics instead of {state.basis.harmonics}: too few harmonics to trust it"
             )
             break
-        coarser = state.basis.harmonics, _guess_from(solution, curve).parameter
+        coarser = state.basis.harmonics, here
         solution = better
     return solution, coarser
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import weakref
 from contextlib import suppress
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
@@ -21,6 +22,8 @@ from suboctave.bifurcation.normal_form import cubic_coefficient, pitchfork_coeff
 from suboctave.continuation.linear import Factor, LeadingBlock, length
 from suboctave.continuation.newton import NewtonOptions, closely
 from suboctave.continuation.point import CurvePoint, point_ahead, solved_again
+from suboctave.curves.augmentation import PLAIN
+from suboctave.curves.finer import FinerMotion, resolved_beside
 from suboctave.curves.kinds.branch_point import BranchPointEquations
 from suboctave.curves.kinds.extremum import ExtremalEquations
 from suboctave.curves.kinds.free_phase import FreePhaseEquations, FreePhaseOperator
@@ -42,6 +45,7 @@ from suboctave.harmonic.energy import action_along, action_gradient
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.perturbation import Kind
+from suboctave.harmonic.truncation import next_harmonics
 from suboctave.lazy import lazy
 
 _MONODROMY = Monodromy()
@@ -96,8 +100,28 @@ class Sample:
     # ------------------------------------------------------------------------------------------ along responses
     @lazy
     def floquet(self) -> FloquetResult:
-        """Multipliers and their errors."""
-        return self.method.along(self.state)
+        """Multipliers and their errors: of the motion with more harmonics where those of the curve are the most that it
+        may have and leave them unresolved.
+        """
+        result = self.method.along(self.state)
+        if result.resolved or not self._at_most_harmonics:
+            return result
+        finer = resolved_beside(self.curve, self.state, self.point.tangent, result)
+        if finer is None:
+            return result.unknown()
+        self.finer, result = finer
+        return replace(result, checks={**result.checks, "harmonics": float(self.finer.harmonics)})
+
+    #: the motion with more harmonics that the multipliers are those of, None where they are the curve's own
+    finer: FinerMotion | None = None
+
+    @property
+    def _at_most_harmonics(self) -> bool:
+        """Whether the curve may not have more harmonics than here, and the monodromy matrix gives its multipliers."""
+        rule, state = self.curve.adaptive, self.state
+        if rule is None or not self.method.follows_monodromy or self.curve.augmentation is not PLAIN:
+            return False
+        return next_harmonics(state, rule).size <= state.basis.size
 
     @lazy
     def doubt(self) -> float:
@@ -110,7 +134,7 @@ class Sample:
     @lazy
     def verdict(self) -> FloquetResult:
         """Multipliers whose errors cover what det J_0 and det J_half say of them."""
-        if self.at_rest:
+        if self.at_rest or self.refined:
             return self.floquet
         result = measures.in_doubt(self.floquet, self._integer_sign, self.half_sign)
         return measures.neutral(result) if self.still else result
@@ -131,7 +155,7 @@ class Sample:
         them: the count and the tests of LP, BP and PD then change together.
         """
         count = self.floquet.unstable
-        if not self.at_rest:
+        if not (self.at_rest or self.refined):
             for which, _ in measures.contradicted(self.floquet, self._integer_sign, self.half_sign):
                 count += 1 if abs(self.floquet.multipliers[which]) <= 1.0 else -1
         return count
@@ -141,9 +165,17 @@ class Sample:
         """What the tests of BP, LP and PD look at."""
         return self.point.orientation > 0.0, self.slope > 0.0, self.half_sign > 0.0
 
+    @property
+    def refined(self) -> bool:
+        """Whether the multipliers are those of a motion with more harmonics than the curve's."""
+        _ = self.floquet
+        return self.finer is not None
+
     @lazy
     def half_sign(self) -> float:
-        """Sign of det J_half."""
+        """Sign of det J_half, or, where it is known with more harmonics, that of prod (1 + mu)."""
+        if self.refined:
+            return float(self.floquet.symmetric[0, 1])
         return Factor.of(self.state.half_jacobian).sign
 
     @lazy

@@ -288,7 +288,7 @@ def _with_more_harmonics(curve: MotionProblem) -> Iterator[MotionProblem]:
         return
     nu = curve.balance.basis.nu
     for harmonics in (15, 31, 63):
-        if curve.balance.basis.harmonics < harmonics * nu and harmonics <= curve.adaptive.maximum:
+        if curve.balance.basis.harmonics < harmonics * nu and harmonics <= curve.adaptive.usual:
             yield curve.with_basis(HarmonicBasis(harmonics * nu, nu))
 
 

@@ -21,13 +21,18 @@ from suboctave.continuation.ending import Ending
 from suboctave.continuation.linear import Factor
 from suboctave.curves.trace import BranchPoint, Trace, Unsettled, joined
 from suboctave.floquet.methods import StabilityMethod
-from suboctave.floquet.result import FloquetResult, written
+from suboctave.floquet.result import NO_VERDICT, FloquetResult, written
 from suboctave.harmonic.evaluation import BalanceState
+from suboctave.harmonic.orbit import PeriodicOrbit
+from suboctave.harmonic.truncation import MOST_HARMONICS
 from suboctave.interruption import Interruption
 from suboctave.kinds import KINDS
 
 #: distance, in scaled arclength and of multipliers, up to which bifurcations fall together
 _AT_ONCE = 1e-5
+#: error of multipliers, in units of that up to which they are resolved, from which on they say nothing
+_VAGUE = 5.0
+_UNRESOLVED = "stability is open: the harmonics that the motions may have do not resolve their multipliers"
 #: motions in a row that witnesses could not settle, after which they are not asked until a verdict is clear again
 _PATIENCE = 3
 
@@ -68,7 +73,7 @@ def with_verdicts(trace: Trace, method: StabilityMethod, name: str) -> Trace:
         if not any(first <= u.arclength[1] and u.arclength[0] <= last for u in (*trace.audit.unsettled, *unsettled)):
             unsettled.append(stretch)
     notes += [note for item in bifurcations if (note := _doubt_beside(item, bifurcations)) is not None]
-    notes += [*_standing(points, name), *_replaced(points, method, name)]
+    notes += [*_standing(points, name), *_replaced(points, method, name), *_at_most(points, name)]
     return replace(
         trace,
         points=points,
@@ -107,6 +112,9 @@ def _settled(points: Sequence[BranchPoint], asking: _Asking, beside: set[int]) -
         result = point.floquet
         if result.decided:
             in_vain = 0
+        elif "harmonics" in result.checks or not np.isfinite(result.errors).any():
+            # more harmonics have been asked already
+            pass
         elif number not in beside and not point.still and in_vain < _PATIENCE:
             result = asking.answer(point.orbit.state(), result)
             in_vain = 0 if result.decided else in_vain + 1
@@ -131,15 +139,9 @@ def _at_event(item: Bifurcation, asking: _Asking) -> Bifurcation:
     return replace(item, floquet=result)
 
 
-def _open(result: FloquetResult) -> np.ndarray:
-    """Which multipliers lie within their errors of the unit circle."""
-    within: np.ndarray = np.abs(np.abs(result.multipliers) - 1.0) <= result.errors
-    return within
-
-
 def _others_open(item: Bifurcation) -> np.ndarray:
     """The same without those that make the bifurcation."""
-    within = _open(item.floquet)
+    within = item.floquet.open
     count = KINDS[item.kind].critical * item.multiplicity if item.kind in KINDS else 0
     if count:
         mu = item.multipliers
@@ -184,9 +186,12 @@ def _reach(points: Sequence[BranchPoint], first: int, last: int, closed: bool) -
 def _explained(result: FloquetResult, reach: tuple[float, float], bifurcations: Sequence[Bifurcation]) -> bool:
     """Whether a bifurcation within reach is why a multiplier lies within its error of the circle."""
     near = {item.kind for item in bifurcations if reach[0] <= item.arclength <= reach[1]}
-    within = _open(result)
+    within = result.open
     mu, errors = result.multipliers[within], result.errors[within]
     explained = np.zeros(len(mu), dtype=bool)
+    if (errors > NO_VERDICT).any():
+        # what may be anywhere is no evidence of a bifurcation
+        return False
     if near & {"LP", "BP"}:
         explained |= np.abs(mu - 1.0) <= 2.0 * errors
     if "PD" in near:
@@ -210,6 +215,9 @@ def _stretches(points: Sequence[BranchPoint], open_ones: list[int], name: str) -
                 "multipliers stay on the unit circle, and nothing settles which side of it they are on"
             )
             continue
+        if max((points[i].floquet.vagueness for i in range(first, last + 1)), default=0.0) > _VAGUE:
+            stretches.append(_stretch(a, b, name, _UNRESOLVED))
+            continue
         words = f"{_worst(result)} by {result.method}, lies within its error of the unit circle"
         stretches.append(_stretch(a, b, name, f"stability is open: a multiplier, {words}"))
     return stretches, notes
@@ -217,7 +225,7 @@ def _stretches(points: Sequence[BranchPoint], open_ones: list[int], name: str) -
 
 def _worst(result: FloquetResult) -> str:
     """The largest multiplier within its error of the unit circle, with that error."""
-    i = int(np.argmax(_open(result)))
+    i = int(np.argmax(result.open))
     return written(result.multipliers[i], result.errors[i])
 
 
@@ -240,6 +248,31 @@ def _standing(points: Sequence[BranchPoint], name: str) -> list[str]:
             f"it{turns}"
         )
     return notes
+
+
+def _at_most(points: Sequence[BranchPoint], name: str) -> list[str]:
+    """One sentence where the most harmonics that a rule allows leave out more of motions than its tolerance."""
+    lacking = [point for point in points if _lacks_harmonics(point.orbit)]
+    if not lacking:
+        return []
+    first, last, worst = lacking[0], lacking[-1], max((p.orbit for p in lacking), key=lambda orbit: orbit.truncation)
+    most, rule = worst.basis.harmonics // worst.basis.nu, worst.adaptive
+    assert rule is not None
+    where = f"{name} = {_value(first, name):.6g}"
+    where = f"between {where} and {_value(last, name):.6g}" if first is not last else f"at {where}"
+    more = 2 * most + 1
+    way = f"harmonics=so.AdaptiveHarmonics(maximum={more}) takes more, at some four times the time a point"
+    return [
+        f"{where} the most harmonics, {most}, leave out up to {worst.truncation:.0e} of the motion (tolerance "
+        f"{rule.tolerance:.0e}): {way if more <= MOST_HARMONICS else 'so.verify asks shooting'}"
+    ]
+
+
+def _lacks_harmonics(orbit: PeriodicOrbit) -> bool:
+    rule = orbit.adaptive
+    if rule is None:
+        return False
+    return orbit.basis.harmonics >= rule.usual * orbit.basis.nu and orbit.truncation > rule.tolerance
 
 
 def _replaced(points: Sequence[BranchPoint], method: StabilityMethod, name: str) -> list[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -13,6 +13,19 @@ from suboctave.compiled import kernel
 from suboctave.floquet.symmetric import UNDAMPED, distinct, symmetric_functions
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.lazy import lazy
+
+#: error of a multiplier, or share of one outside the circle, up to which it is resolved; modulus, with its error, from
+#: which on it may decide
+RESOLVED, _DECIDING = 0.2, 0.5
+#: error of a multiplier above which it is known to no side of the circle, and the same as a share of one outside: an
+#: estimate of first order means nothing where it is as large as what it belongs to
+NO_VERDICT, _SHARE = 1.0, 0.5
+
+
+@kernel()
+def _known_within(mu, error):
+    """How far off a multiplier may be: anywhere, where its error estimate is too large to mean anything."""
+    return error if error <= max(NO_VERDICT, _SHARE * abs(mu)) else np.inf
 
 
 @kernel()
@@ -25,7 +38,7 @@ def _off_the_circle(mu, errors):
         beyond = abs(mu[i]) - 1.0
         if not (beyond <= largest or math.isnan(largest)):
             largest = beyond
-        decided = decided and abs(beyond) > errors[i]
+        decided = decided and abs(beyond) > _known_within(mu[i], errors[i])
         outside += beyond > 0.0
         nearest = min(nearest, abs(beyond))
     return largest, decided, outside, nearest
@@ -72,6 +85,10 @@ class FloquetResult:
         """False if the method could not say anything; `note` says why."""
         return all(map(cmath.isfinite, self.multipliers.tolist()))
 
+    def unknown(self) -> FloquetResult:
+        """The same multipliers, of which nothing is known."""
+        return replace(self, errors=np.full(len(self.errors), np.inf))
+
     @property
     def error(self) -> float:
         """Largest error estimate among the multipliers that decide (modulus above one half)."""
@@ -111,8 +128,26 @@ class FloquetResult:
     @property
     def open(self) -> np.ndarray:
         """Which multipliers lie within their errors of the unit circle, (2 n,)."""
-        within: np.ndarray = np.abs(np.abs(self.multipliers) - 1.0) <= self.errors
+        size = np.abs(self.multipliers)
+        vague = self.errors > np.maximum(NO_VERDICT, _SHARE * size)
+        within: np.ndarray = (np.abs(size - 1.0) <= self.errors) | vague
         return within
+
+    @lazy
+    def resolved(self) -> bool:
+        """Whether the multipliers that may decide are known to a share of themselves: the error of a multiplier of the
+        corrected motion goes with the square of the shift that is stated.
+        """
+        return self.vagueness <= 1.0
+
+    @property
+    def vagueness(self) -> float:
+        """Largest error of a multiplier that may decide, in units of that up to which it is resolved."""
+        if not self.applicable:
+            return math.inf
+        size = np.abs(self.multipliers)
+        deciding = size + self.errors > _DECIDING
+        return float((self.errors / (RESOLVED * np.maximum(1.0, size)))[deciding].max(initial=0.0))
 
     @property
     def undamped(self) -> bool:

@@ -334,6 +334,11 @@ class BalanceState:
         """R_X, shape (dimension, dimension)."""
         return self._add_tangent(np.zeros((self.x.size, self.x.size)), self.blocks, mean=True)
 
+    def low_jacobian(self, harmonics: int) -> Array:
+        """R_X between the harmonics up to some alone, square, with `size (2 harmonics + 1)` rows."""
+        rows = self.balance.size * (2 * harmonics + 1)
+        return self._add_tangent(np.zeros((rows, rows)), self.blocks[: harmonics + 1], mean=True)
+
     def extended_jacobian(self, name: str) -> Array:
         """`[R_X R_name]`, shape (dimension, dimension + 1); name is "omega" or a parameter."""
         m = self.x.size
@@ -445,10 +450,11 @@ class BalanceState:
         high, top = self.basis.harmonics, self.balance.top
         force = -2.0 * self.force_spectra.T[high + 1 :] @ self.balance.acting
         frequencies = self.rate * np.arange(high + 1.0, top + 1.0)
-        blocks = self.linear.stiffness(frequencies)
-        if self.balance.size == 1:
-            return force / blocks[:, :, 0]
-        return np.asarray(np.linalg.solve(blocks, force[:, :, None])[:, :, 0], dtype=complex)
+        response = _response(self.linear.stiffness(frequencies), force)
+        if response is None:
+            # an undamped vibration right at a harmonic: beside it the response is as large as numbers tell
+            response = _response(self.linear.stiffness((1.0 + _ASIDE) * frequencies), force)
+        return np.zeros_like(force) if response is None else response
 
     @lazy
     def squares(self) -> Array:
@@ -484,6 +490,20 @@ class BalanceState:
         x[self.basis.size :: 2] = self.neglected.real
         x[self.basis.size + 1 :: 2] = -self.neglected.imag
         return basis, x
+
+
+#: how far beside an undamped resonance its response is taken, as a share of the frequency: a root of what rounding is
+_ASIDE = 1e-8
+
+
+def _response(blocks: ComplexArray, force: ComplexArray) -> ComplexArray | None:
+    """A^-1 f for matrices (F, n, n) and forces (F, n); None where one is singular."""
+    if blocks.shape[-1] == 1:
+        return force / blocks[:, :, 0] if blocks.all() else None
+    try:
+        return np.asarray(np.linalg.solve(blocks, force[:, :, None])[:, :, 0], dtype=complex)
+    except np.linalg.LinAlgError:
+        return None
 
 
 def length(vector: Array) -> float:

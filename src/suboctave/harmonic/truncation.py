@@ -28,6 +28,13 @@ from suboctave.harmonic.evaluation import BalanceState, length
 _MOST_UNKNOWNS = 4000
 #: numbers of harmonics (of omega) that adaptive selection chooses from
 _LADDER = (3, 5, 7, 9, 11, 13, 15, 19, 23, 27, 31, 39, 47, 55, 63, 79, 95, 111, 127, 159, 191, 223, 255)
+_LADDER += (319, 383, 447, 511)
+MOST_HARMONICS = _LADDER[-1]
+#: most harmonics of omega where nobody says how many
+_USUAL = 127
+#: unknowns up to which twice as many are taken where those do not suffice, of a curve and of one bifurcation:
+#: factorisations of some milliseconds at every iteration, of some ten at a few
+_FEW_UNKNOWNS, _FOR_ONE = 511, 1023
 #: ratio of neighbouring highest harmonics for sub-harmonic motions, whose steps need not be whole multiples of omega
 _FINER = 1.05
 #: share of a class of harmonics in the motion below which what is neglected of it counts as if it had that share, and
@@ -47,23 +54,29 @@ class AdaptiveHarmonics:
     event_tolerance
         The same for located bifurcations, which are solved again with more harmonics.
     minimum, maximum
-        Bounds on the highest harmonic of omega; at the maximum the estimate is stated and the curve goes on.
+        Bounds on the highest harmonic of omega; at the maximum the estimate is stated and the curve goes on. None: 127,
+        and up to 255 where so many do not suffice and the unknowns are few.
     """
 
     tolerance: Positive = 1e-5
     event_tolerance: Positive = 3e-7
     minimum: Count = 5
-    maximum: Count = 127
+    maximum: Count | None = None
 
     def __post_init__(self) -> None:
         if not (self.event_tolerance <= self.tolerance < 0.1):
             raise InputError(
                 f"need 0 < event_tolerance <= tolerance < 0.1, got {self.event_tolerance:g} and {self.tolerance:g}"
             )
-        if not self.minimum <= self.maximum <= _LADDER[-1]:
+        if not self.minimum <= self.usual <= _LADDER[-1]:
             raise InputError(
-                f"need 1 <= minimum <= maximum <= {_LADDER[-1]} harmonics, got {self.minimum} and {self.maximum}"
+                f"need 1 <= minimum <= maximum <= {_LADDER[-1]} harmonics, got {self.minimum} and {self.usual}"
             )
+
+    @property
+    def usual(self) -> int:
+        """Most harmonics of omega that the tolerances ask for."""
+        return max(self.minimum, _USUAL) if self.maximum is None else self.maximum
 
 
 def motion_size(state: BalanceState) -> float:
@@ -80,7 +93,7 @@ def _limits(options: AdaptiveHarmonics, state: BalanceState) -> tuple[int, float
     """Fewest and most harmonics of omega that may be chosen."""
     basis, balance = state.basis, state.balance
     affordable = (_MOST_UNKNOWNS / balance.size - 1) / (2 * basis.nu)
-    return max(options.minimum, balance.highest_load), max(basis.harmonics / basis.nu, min(options.maximum, affordable))
+    return max(options.minimum, balance.highest_load), max(basis.harmonics / basis.nu, min(options.usual, affordable))
 
 
 def most_harmonics(state: BalanceState, options: AdaptiveHarmonics) -> int:
@@ -102,6 +115,18 @@ def next_harmonics(state: BalanceState, options: AdaptiveHarmonics) -> HarmonicB
     rungs = _rungs(*_limits(options, state), high // nu)
     wanted = next((h for h in rungs if h * nu >= 1.5 * high), rungs[-1])
     return HarmonicBasis(wanted * nu, nu) if wanted * nu > high else state.basis
+
+
+def beyond_usual(state: BalanceState, options: AdaptiveHarmonics, one: bool = False) -> HarmonicBasis:
+    """A basis with twice as many harmonics as a curve has as a rule, for a motion that these leave out more of than the
+    tolerance; the present one where they suffice, where the user gave the most, and where the unknowns are too many.
+    one: for a single motion, not a curve.
+    """
+    basis = state.basis
+    wanted = HarmonicBasis((2 * _USUAL + 1) * basis.nu, basis.nu)
+    few = state.balance.size * wanted.size <= (_FOR_ONE if one else _FEW_UNKNOWNS)
+    lacking = basis.harmonics < wanted.harmonics and truncation(state) > options.tolerance
+    return wanted if options.maximum is None and few and lacking else basis
 
 
 def _expected(tail: Array, high: int, bound: float) -> float:

@@ -1,0 +1,104 @@
+"""Where a bifurcation lies that the largest number of harmonics does not resolve: on the curve with more of them.
+
+The system of a bifurcation is solved for with as many harmonics as a dense matrix can carry. Its place is theirs: what
+those left out move is seen with more of them (`curves.finer`), along whose curve the bifurcation is a zero of one
+scalar, the tangent's component along the free parameter for an LP, `prod (1 + mu)` for a PD, `|mu| - 1` of the critical
+pair for an NS. How far the zero is from what was solved for is the uncertainty of that; where there is none nearby, the
+bifurcation is one of the truncated equations alone.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from suboctave.continuation.problem import Array
+from suboctave.curves.events.locate import Singular
+from suboctave.curves.events.monitors import BifurcationKind
+from suboctave.curves.finer import FinerMotion, resolved_beside
+from suboctave.curves.motion import MotionProblem
+from suboctave.floquet.monodromy import floquet_multipliers
+from suboctave.floquet.result import FloquetResult
+from suboctave.harmonic.truncation import next_harmonics
+
+#: distance of a located bifurcation's critical multiplier from where it should be, and error of it, up to which the
+#: harmonics it was solved with suffice
+CRITICAL = 1e-3
+#: first way along the curve, in scaled arclength, and the farthest at which the zero is looked for
+_FIRST, _FARTHEST = 1e-4, 0.1
+#: places that are tried, and distance of two, as a share of that from the bifurcation solved for, that settles the zero
+_TRIED, _SETTLED = 12, 1e-2
+#: distance of two places that settles it anyway
+_CLOSE = 1e-9
+
+
+class Resolved(NamedTuple):
+    """A bifurcation with more harmonics: value of the free parameter, multipliers."""
+
+    parameter: float
+    floquet: FloquetResult
+
+
+def lacks_harmonics(kind: BifurcationKind, solution: Singular, curve: MotionProblem) -> bool:
+    """Whether the harmonics of a located bifurcation, the most that its curve may have, leave it open where it lies."""
+    rule, critical = curve.adaptive, kind.critical(solution)
+    if rule is None or critical is None or kind.name not in _SCALARS or kind.multiplicity > 1:
+        return False
+    if next_harmonics(solution.state, rule).size > solution.state.basis.size:
+        return False
+    away = np.abs(solution.floquet.multipliers - critical)
+    nearest = int(np.argmin(away))
+    return not max(float(away[nearest]), float(solution.floquet.errors[nearest])) <= CRITICAL
+
+
+def resolved(kind: BifurcationKind, solution: Singular, curve: MotionProblem, tangent: Array) -> Resolved | None:
+    """The bifurcation on the curve with more harmonics, from one solved for on `curve`, in the basis of that; None if
+    there is none nearby. `tangent`: of the curve there.
+
+    Raises
+    ------
+    ConvergenceError
+        If there is no motion with more harmonics.
+    """
+    critical, scalar = kind.critical(solution), _SCALARS[kind.name]
+    assert critical is not None
+    found = resolved_beside(curve, solution.state, tangent, solution.floquet)
+    if found is None:
+        return None
+    motion, result = found
+    places, values = [0.0], [scalar(motion, result, critical)]
+    way = math.copysign(_FIRST, 1.0)
+    for _ in range(_TRIED):
+        if abs(way) > _FARTHEST:
+            return None
+        motion = motion.beside(way - places[-1])
+        result = floquet_multipliers(motion.state)
+        places.append(way)
+        values.append(scalar(motion, result, critical))
+        change = values[-1] - values[-2]
+        if change == 0.0:
+            return None
+        step = -values[-1] * (places[-1] - places[-2]) / change
+        if abs(step) <= max(_CLOSE, _SETTLED * abs(way)):
+            return Resolved(motion.parameter, result)
+        way += math.copysign(min(abs(step), _FARTHEST / 4.0), step)
+    return None
+
+
+def _slope(motion: FinerMotion, result: FloquetResult, critical: complex) -> float:
+    return float((motion.weights * motion.tangent)[-1])
+
+
+def _double(motion: FinerMotion, result: FloquetResult, critical: complex) -> float:
+    sign, logarithm = result.symmetric[:, 1].tolist()
+    return float(sign * math.exp(logarithm))
+
+
+def _beyond_circle(motion: FinerMotion, result: FloquetResult, critical: complex) -> float:
+    mu = result.multipliers
+    return float(abs(mu[np.abs(mu - critical).argmin()])) - 1.0
+
+
+_SCALARS = {"LP": _slope, "PD": _double, "NS": _beyond_circle}
