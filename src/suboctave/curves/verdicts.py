@@ -30,8 +30,6 @@ from suboctave.kinds import KINDS
 
 #: distance, in scaled arclength and of multipliers, up to which bifurcations fall together
 _AT_ONCE = 1e-5
-#: error of multipliers, in units of that up to which they are resolved, from which on they say nothing
-_VAGUE = 5.0
 _UNRESOLVED = "stability is open: the harmonics that the motions may have do not resolve their multipliers"
 #: motions in a row that witnesses could not settle, after which they are not asked until a verdict is clear again
 _PATIENCE = 3
@@ -215,7 +213,7 @@ def _stretches(points: Sequence[BranchPoint], open_ones: list[int], name: str) -
                 "multipliers stay on the unit circle, and nothing settles which side of it they are on"
             )
             continue
-        if max((points[i].floquet.vagueness for i in range(first, last + 1)), default=0.0) > _VAGUE:
+        if any(points[i].floquet.vague for i in range(first, last + 1)):
             stretches.append(_stretch(a, b, name, _UNRESOLVED))
             continue
         words = f"{_worst(result)} by {result.method}, lies within its error of the unit circle"

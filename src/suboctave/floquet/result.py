@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from suboctave.compiled import kernel
 from suboctave.floquet.symmetric import UNDAMPED, distinct, symmetric_functions
@@ -20,6 +21,12 @@ RESOLVED, _DECIDING = 0.2, 0.5
 #: error of a multiplier above which it is known to no side of the circle, and the same as a share of one outside: an
 #: estimate of first order means nothing where it is as large as what it belongs to
 NO_VERDICT, _SHARE = 1.0, 0.5
+
+
+def no_verdict(multipliers: ComplexArray, errors: Array) -> NDArray[np.bool_]:
+    """Of which multipliers, of any shape, the errors are too large to tell a side of the unit circle."""
+    vague: NDArray[np.bool_] = errors > np.maximum(NO_VERDICT, _SHARE * np.abs(multipliers))
+    return vague
 
 
 @kernel()
@@ -128,10 +135,13 @@ class FloquetResult:
     @property
     def open(self) -> np.ndarray:
         """Which multipliers lie within their errors of the unit circle, (2 n,)."""
-        size = np.abs(self.multipliers)
-        vague = self.errors > np.maximum(NO_VERDICT, _SHARE * size)
-        within: np.ndarray = (np.abs(size - 1.0) <= self.errors) | vague
-        return within
+        near: np.ndarray = np.abs(np.abs(self.multipliers) - 1.0) <= self.errors
+        return near | no_verdict(self.multipliers, self.errors)
+
+    @property
+    def vague(self) -> bool:
+        """Whether the errors of multipliers are so large that there is no verdict."""
+        return bool(no_verdict(self.multipliers, self.errors).any())
 
     @lazy
     def resolved(self) -> bool:

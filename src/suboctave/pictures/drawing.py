@@ -232,7 +232,7 @@ class Drawing:
         every = {name: entry for frame in self.frames for name, entry in frame.entries.items()}
         if not self.by_kind:
             return every
-        lines = ["stable", "unstable"]
+        lines = ["stable", "unstable", "stability open"]
         kinds = [name for look in style.KINDS.values() for name in (look.name, f"{look.name}{style.SUBCRITICAL}")]
 
         def rank(name: str) -> tuple[int, int]:

@@ -28,6 +28,8 @@ from suboctave.pictures.drawing import Axis, Drawing, Entry, Frame, Markers, Tic
 from suboctave.pictures.options import Coordinates, CurveOptions, View
 from suboctave.pictures.paper import draw, dress, handles, save_or_show
 from suboctave.pictures.strokes import (
+    OPEN,
+    Verdict,
     add_strokes,
     check_count,
     checked,
@@ -177,7 +179,8 @@ def response_frame(
         for stable in add_strokes(frame, dataset, axes, pen, seen, earlier=earlier, spread=around) - {None}:
             # where ink is the colour of one period, the dashes are shown in a colour of none
             plain_pen = Pen(style.SOFT if periods else style.INK, 1.0, style.UNSTABLE_DASH)
-            frame.entries[_ROLES[stable]] = Entry(plain_pen.along(stable))
+            own = plain_pen.dotted if stable == OPEN else plain_pen.along(stable)
+            frame.entries[_ROLES[stable]] = Entry(own)
     for index in order:  # markers after all lines: none is crossed out by another curve
         dataset, curve = group[index], titles[index] if several else ""
         # the shape tells the kind, the filling the criticality, the edge the curve, where there are several
@@ -192,7 +195,7 @@ def response_frame(
     return frame
 
 
-_ROLES = {None: "curve", True: "stable", False: "unstable"}
+_ROLES: dict[Verdict, str] = {None: "curve", True: "stable", False: "unstable", OPEN: "stability open"}
 
 
 def _as_list(curves: xarray.Dataset | Sequence[xarray.Dataset]) -> list[xarray.Dataset]:

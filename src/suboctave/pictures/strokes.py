@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
 
@@ -22,10 +22,16 @@ from suboctave.pictures import style
 from suboctave.pictures.drawing import Frame, Polyline, lengths
 from suboctave.pictures.options import Coordinates
 from suboctave.pictures.style import KindStyle, Pen
-from suboctave.store.layout import check_layout, coordinate
+from suboctave.store.layout import check_layout, coordinate, open_points
 
 if TYPE_CHECKING:
     import xarray
+
+
+#: the verdict of motions whose multipliers have errors as large as themselves
+OPEN: Literal["open"] = "open"
+Verdict: TypeAlias = bool | Literal["open"] | None
+_VERDICTS: tuple[Verdict, ...] = (False, True, OPEN)
 
 
 @dataclass(frozen=True)
@@ -37,13 +43,17 @@ class Line:
     point, event
         The index of the point or event of the curve at each, else -1, (vertices,).
     stable
-        Whether the motions between two vertices are, (vertices - 1,); of a stroke one verdict. None: not computed.
+        Whether the motions between two vertices are, (vertices - 1,); of a stroke one verdict, OPEN where the errors of
+        multipliers leave none. None: not computed.
+    open
+        Where they leave none, (vertices - 1,).
     """
 
     at: np.ndarray
     point: np.ndarray
     event: np.ndarray
     stable: Any
+    open: Any = False
 
     @property
     def x(self) -> np.ndarray:
@@ -53,7 +63,7 @@ class Line:
     def y(self) -> np.ndarray:
         return np.asarray(self.at[-1])
 
-    def stroke(self, first: int, last: int, stable: bool | None) -> Line:
+    def stroke(self, first: int, last: int, stable: Verdict) -> Line:
         """The vertices first .. last, of one verdict."""
         here = slice(first, last + 1)
         return Line(self.at[:, here], self.point[here], self.event[here], stable)
@@ -72,8 +82,9 @@ def cut(dataset: xarray.Dataset, whole: Line) -> list[Line]:
         return [whole]
     if whole.stable.size == 0:
         return [replace(whole, stable=bool(dataset["stable"].to_numpy().all()))]
-    ends = [0, *(np.flatnonzero(np.diff(whole.stable)) + 1), whole.stable.size]
-    return [whole.stroke(first, last, bool(whole.stable[first])) for first, last in pairwise(ends)]
+    verdicts = np.where(whole.open, 2, whole.stable)
+    ends = [0, *(np.flatnonzero(np.diff(verdicts)) + 1), verdicts.size]
+    return [whole.stroke(first, last, _VERDICTS[verdicts[first]]) for first, last in pairwise(ends)]
 
 
 def line_through(dataset: xarray.Dataset, points: np.ndarray, events: np.ndarray) -> Line:
@@ -100,7 +111,11 @@ def line_through(dataset: xarray.Dataset, points: np.ndarray, events: np.ndarray
     here[position] = dataset["stable"].to_numpy().astype(bool)
     here[event_position] = dataset["event_stable_after"].to_numpy()[order] == 1
     first, last, between = here[:-1], here[1:], event[1:] >= 0
-    return Line(at, point, event, np.where(event[:-1] >= 0, np.where(between, first, last), first & (between | last)))
+    stable = np.where(event[:-1] >= 0, np.where(between, first, last), first & (between | last))
+    vague = open_points(dataset)
+    # at events what lies before them in the order of the points tells
+    number = np.maximum.accumulate(point)
+    return Line(at, point, event, stable, vague[number[:-1]] | vague[np.minimum(number[:-1] + 1, count - 1)])
 
 
 #: in units of the frame: nearer than this two lines are one, and so far along a line a part of it is another part
@@ -229,7 +244,7 @@ Seen: TypeAlias = "Mapping[bool | None, tuple[str, str, str]]"
 
 def seen_as(role: str, name: str) -> Seen:
     """All strokes of a curve alike."""
-    return dict.fromkeys((None, True, False), (role, name, name))
+    return dict.fromkeys((None, True, False, OPEN), (role, name, name))
 
 
 def checked(curves: Sequence[Any]) -> list[xarray.Dataset]:
@@ -275,7 +290,7 @@ def add_strokes(
     spread: tuple[float, float] = (1.0, 1.0),
     floor: float | None = None,
     layer: float = 3.0,
-) -> set[bool | None]:
+) -> set[Verdict]:
     """Add the strokes of a curve, or in space their projection on the floor at this height; returns their verdicts.
 
     In the plane strokes are smooth, and dashes are not drawn
@@ -289,7 +304,7 @@ def add_strokes(
         role, name, group = seen[stroke.stable]
         drawn: dict[str, Any] = {"smooth": earlier is not None, "role": role, "layer": layer}
         drawn |= {"curve": number_of(dataset), "vertices": np.where(stroke.event >= 0, -1 - stroke.event, stroke.point)}
-        own = pen.along(stroke.stable if floor is None else None)
+        own = (pen.dotted if stroke.stable == OPEN else pen.along(stroke.stable)) if floor is None else pen.along(None)
         texts = partial(hover, stroke.point, stroke.event)
         frame.items.append(Polyline(at, own, name=name, group=group, hover=texts, **drawn))
     return {stroke.stable for stroke in strokes}

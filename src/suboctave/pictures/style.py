@@ -39,6 +39,7 @@ CURVE_COLOURS = ("#0072B2", "#E69F00", INK, "#009E73", "#CC79A7", "#56B4E9")  # 
 
 Dash: TypeAlias = "str | tuple[float, tuple[float, ...]]"
 STABLE_DASH: Dash = "solid"
+OPEN_DASH: Dash = (0, (0.7, 1.5))
 UNSTABLE_DASH: Dash = (0, (3.2, 1.6))  # in line widths: begins with a dash, so the change shows where it happens
 
 SUBCRITICAL = ", subcritical"  # in a legend, behind the kind
@@ -135,6 +136,11 @@ class Pen:
     def along(self, stable: bool | None) -> Pen:
         """The pen for a stretch of the curve: dashed where motions are unstable."""
         return self if stable is False else replace(self, dash=STABLE_DASH)
+
+    @property
+    def dotted(self) -> Pen:
+        """The pen for a stretch of the curve whose stability is open."""
+        return replace(self, dash=OPEN_DASH)
 
 
 @dataclass(frozen=True)

@@ -227,8 +227,13 @@ class Branch(CurveTables, BranchReadings):
         return np.array([self.stable_at(point) for point in self.points], dtype=bool)
 
     def stable_at(self, point: BranchPoint) -> bool:
-        """Whether the motion at a point is stable."""
-        return point.floquet.stable
+        """Whether the motion at a point is stable; not where that is open."""
+        return point.floquet.stable and not point.floquet.vague
+
+    @cached_property
+    def open(self) -> np.ndarray:
+        """Where the errors of multipliers are too large for a verdict, shape (len,), bool."""
+        return np.array([p.floquet.vague for p in self.points], dtype=bool)
 
     def deciding(self, point: BranchPoint, multipliers: ComplexArray) -> NDArray[np.bool_]:
         """Which multipliers of the motion at a point decide whether it is stable: all, (m,), bool."""
@@ -251,9 +256,11 @@ class Branch(CurveTables, BranchReadings):
 
     @property
     def verdicts(self) -> str:
-        """How many motions are unstable, in words, and of how many that cannot be told: without damping."""
+        """How many motions are unstable, in words, and of how many that cannot be told: without damping, or where the
+        errors of multipliers are too large.
+        """
         results = [p.floquet for p in self.points]
-        decided = [r for r in results if r.decided or not r.undamped]
+        decided = [r for r in results if not r.vague and (r.decided or not r.undamped)]
         unstable, rest = sum(not r.stable for r in decided), len(results) - len(decided)
         return f"{unstable} unstable" + (f", {rest} not settled" if rest else "")
 

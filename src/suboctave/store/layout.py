@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from suboctave.errors import InputError, suggest
+from suboctave.floquet.result import no_verdict
 from suboctave.version import __version__
 
 if TYPE_CHECKING:
@@ -201,6 +202,15 @@ def branch_dataset(branch: Any) -> xarray.Dataset:
         coefficient=("point", np.asarray(branch.coefficient, dtype=float), meaning),
         event_extreme=("event", np.array([row.extreme for row in rows], dtype=object)),
     )
+
+
+def open_points(dataset: xarray.Dataset) -> np.ndarray:
+    """At which points of a response the errors of multipliers are too large for a verdict, (point,), bool."""
+    if dataset.attrs.get("tracked") or not {"multipliers", "multiplier_errors"} <= set(dataset.variables):
+        return np.zeros(dataset.sizes["point"], dtype=bool)
+    mu, errors = (dataset[name].to_numpy() for name in ("multipliers", "multiplier_errors"))
+    vague: np.ndarray = no_verdict(mu, errors).any(axis=1)
+    return vague
 
 
 def events_met(branch: Any) -> list[Any]:

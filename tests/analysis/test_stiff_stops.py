@@ -1,0 +1,85 @@
+"""Laws so stiff that the most harmonics do not suffice, held against shooting: what is listed and what is drawn is true
+within what is stated, or said to be open.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import suboctave as so
+from suboctave.timedomain import locate_by_shooting, shoot
+
+
+def stop(stiffness: float, gap: float, damping: float, load: float) -> so.System:
+    """One mass on a spring of one, with an exact stop."""
+    return so.System(1.0, damping, 1.0, [so.ElasticStop(0, stiffness, gap)], [so.HarmonicLoad(0, load)])
+
+
+def true_multipliers(orbit: so.PeriodicOrbit) -> np.ndarray:
+    """Of the motion that shooting leads to, by descending modulus."""
+    found = shoot(orbit.system, orbit.start(), orbit.omega, values=dict(orbit.values))
+    mu = np.asarray(found.multipliers)
+    return mu[np.argsort(-np.abs(mu))]
+
+
+@pytest.fixture(scope="module")
+def doubling() -> so.Branch:
+    return so.frequency_response(stop(1e3, 0.5, 0.08, 0.4), (0.637, 0.6395))
+
+
+def test_a_doubling_states_how_far_harmonics_move_it(doubling):
+    (item,) = doubling.bifurcations
+    assert item.kind == "PD"
+    # event-driven shooting, tolerance 1e-12
+    true = 0.63819121
+    assert item.omega == pytest.approx(true, abs=1e-6)
+    assert abs(item.omega - true) <= item.uncertainty + 1e-8
+    assert 0.0 < item.uncertainty < 1e-6
+    assert abs(item.critical_multiplier() + 1.0) <= item.critical_error
+
+
+def test_the_most_harmonics_are_said_once_with_the_call_that_raises_them(doubling):
+    said = [line for line in doubling.warnings if "leave out up to" in line]
+    assert len(said) == 1
+    assert "harmonics=so.AdaptiveHarmonics(maximum=255)" in said[0]
+
+
+def test_stable_motions_are_not_drawn_unstable():
+    curve = so.frequency_response(stop(1e4, 1.0, 0.2, 0.6), (0.70, 0.715))
+    assert curve.stable.all()
+    assert not curve.open.any()
+    assert not curve.audit.unsettled
+    orbit = curve.orbits[len(curve) // 2]
+    mu, errors = (values[len(curve) // 2] for values in (curve.multipliers, curve.multiplier_errors))
+    assert np.abs(np.abs(mu) - np.abs(true_multipliers(orbit))).max() < 0.02
+    assert errors.max() < 0.2
+
+
+def test_at_a_given_number_of_harmonics_what_they_do_not_resolve_is_open():
+    curve = so.frequency_response(stop(1e4, 1.0, 0.2, 0.6), (0.70, 0.705), harmonics=63)
+    vague = curve.multiplier_errors.max(axis=1) > np.maximum(1.0, 0.5 * np.abs(curve.multipliers[:, 0]))
+    assert vague.any()
+    assert curve.open[vague].all()
+    assert not curve.stable[vague].any()
+    assert f"{np.count_nonzero(curve.open)} not settled" in repr(curve)
+    assert any("do not resolve their multipliers" in u.reason for u in curve.audit.unsettled)
+
+
+@pytest.mark.slow
+def test_a_bubble_has_neither_a_doubling_nor_unstable_motions():
+    """True multipliers have moduli of .87 to .90 there (shooting)."""
+    text = "x'' + 1.5*x'**2/x + c*x'/x**2 - x**(-5.2) + 1/x - A*cos(omega*t)/x = 0"
+    system = so.System.from_equations(text, parameters={"c": 0.1, "A": 0.2})
+    curve = so.frequency_response(system, (3.0, 1.4), start=[1.0, 0.0])
+    assert not len(curve.bifurcations)
+    assert (curve.stable | curve.open).all()
+    assert np.count_nonzero(curve.open) <= 3
+
+
+@pytest.mark.slow
+def test_limit_points_of_a_stop_ten_thousand_times_as_stiff():
+    curve = so.frequency_response(stop(1e4, 1.0, 0.2, 0.6), (1.55, 1.6))
+    for item in curve.bifurcations["LP"]:
+        true = locate_by_shooting(item.orbit.system, "LP", item.orbit.start(), item.omega)
+        assert abs(item.omega - true.omega) <= item.uncertainty + 1e-8
