@@ -242,3 +242,20 @@ def test_verdict_and_doubt():
     assert pair.margin == pytest.approx(0.2)
     # what decays within the period decides nothing
     assert FloquetResult(np.array([0.9, 1e-9], complex), np.array([1e-8, 1e-2])).error == 1e-8
+
+
+@pytest.mark.parametrize(
+    ("mu", "error", "decided"),
+    [
+        (-3.98 + 14.0j, 13.0, False),  # less than its distance from the circle, and as large as it is itself
+        (1879.0, 1500.0, False),
+        (5.2, 2.2, True),
+        (1e6, 1e3, True),
+        (0.02, 0.9, True),
+    ],
+)
+def test_an_error_as_large_as_the_multiplier_is_no_verdict(mu, error, decided):
+    result = FloquetResult(np.array([mu], complex), np.array([error]))
+    assert result.decided is decided
+    assert result.open[0] == (not decided)
+    assert result.vague is not decided

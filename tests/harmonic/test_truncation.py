@@ -79,3 +79,19 @@ def test_choice_of_the_number_of_harmonics():
         state = HarmonicBalance(linear, HarmonicBasis(15 * nu, nu)).at(np.eye(30 * nu + 1)[:, 1:2], 0.9)
         low = choose_harmonics(state, rule, rule.tolerance)
         assert (low.harmonics, low.nu) == (7 * nu, nu)
+
+
+def test_an_undamped_vibration_right_at_a_neglected_harmonic_has_a_large_response():
+    """Natural frequencies 5 and 6, the load at 1: the fifth harmonic of the cubic's force meets a resonance."""
+    system = so.System(
+        np.eye(2), np.zeros((2, 2)), np.diag([25.0, 36.0]), [so.CubicSpring(0, 1.0)], [so.HarmonicLoad(0, 1.0)]
+    )
+    balance = HarmonicBalance(system, HarmonicBasis(3))
+    x = np.zeros((7, 2))
+    x[1, 0], x[5, 0] = 0.1, 0.01
+    state = balance.at(x, 1.0)
+    assert np.isfinite(state.neglected).all()
+    # the resonance outgrows what the other harmonics do
+    assert np.abs(state.neglected[1, 0]) > 1e3 * np.abs(state.neglected[[0, 2, 3]]).max()
+    one = so.System(1.0, 0.0, 25.0, [so.CubicSpring(0, 1.0)], [so.HarmonicLoad(0, 1.0)])
+    assert np.isfinite(truncation(HarmonicBalance(one, HarmonicBasis(3)).at(x[:, :1], 1.0)))

@@ -209,8 +209,7 @@ def open_points(dataset: xarray.Dataset) -> np.ndarray:
     if dataset.attrs.get("tracked") or not {"multipliers", "multiplier_errors"} <= set(dataset.variables):
         return np.zeros(dataset.sizes["point"], dtype=bool)
     mu, errors = (dataset[name].to_numpy() for name in ("multipliers", "multiplier_errors"))
-    vague: np.ndarray = no_verdict(mu, errors).any(axis=1)
-    return vague
+    return np.asarray(no_verdict(mu, errors).any(axis=1))
 
 
 def events_met(branch: Any) -> list[Any]:
