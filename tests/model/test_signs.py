@@ -66,7 +66,7 @@ def test_a_spring_that_softens_beyond_a_gap_is_a_text():
 
 @pytest.mark.parametrize("power", [1001, 10**6, 10**400])
 def test_powers_that_no_number_can_hold_are_refused(power):
-    with pytest.raises(InputError, match="larger than 1000|a whole number of at most 18 digits"):
+    with pytest.raises(InputError, match=r"larger than 1000|a whole number of at most 18 digits"):
         so.PolynomialSpring(0, {power: 1.0})
     so.PolynomialSpring(0, {1000: 1.0})
 
