@@ -338,7 +338,7 @@ class BlownUp:
         plane = np.concatenate((np.where(self.odd, u[-2] * x, x), [float(x @ w), plane[-1]])) / own
         solved = correct(self, u, plane / length(plane), own, newton)
         if solved.u[-2] <= 0.0:
-            raise ConvergenceError("what was found lies behind the period doubling in which the doubled part vanishes")
+            raise ConvergenceError("what was found lies elsewhere")
         heading = None if along is None else self.along(u, along)
         return self.plain_point(make_point(solved, heading, 0.0), arclength)
 

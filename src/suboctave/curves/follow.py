@@ -16,12 +16,10 @@ from suboctave.bifurcation.bifurcation import CONTACT_KINDS, Bifurcation
 from suboctave.continuation import CurvePoint, Event, March
 from suboctave.continuation.ending import Ending, EndReason
 from suboctave.continuation.events import Bracket
-from suboctave.continuation.linear import distance
 from suboctave.continuation.march import Arrival
 from suboctave.continuation.newton import NewtonOptions
 from suboctave.continuation.point import point_ahead, point_between, solved_again
 from suboctave.continuation.problem import Curve
-from suboctave.curves.blow_up import BlownUp
 from suboctave.curves.corners import beyond_corner
 from suboctave.curves.events.grazings import locate_grazings
 from suboctave.curves.events.layer import behind_their_grazings
@@ -37,7 +35,7 @@ from suboctave.curves.events.monitors import (
 )
 from suboctave.curves.guard import Crossing, GuardedStep, StepGuard
 from suboctave.curves.identity import drop_seam, same_event
-from suboctave.curves.junction import LOST, UNSEEN, Meeting, meeting, passes_doubling, regular_point
+from suboctave.curves.junction import UNSEEN, Meeting, lost, meeting, passes_doubling, plain_point, regular_point
 from suboctave.curves.leaving import multiple_at
 from suboctave.curves.ledgers import REASON, CountCheck, DoublingWatch, HiddenDoublings, pair_in
 from suboctave.curves.motion import CRITICAL, MotionEvaluation, MotionProblem
@@ -233,12 +231,7 @@ class _Follower(Driver):
         return known if known is not None and known.point is point else Sample(point, self.settings.stability)
 
     def _plain(self, point: CurvePoint) -> CurvePoint:
-        """A point of the march as one of the curve of motions, behind the last one taken in."""
-        if not isinstance(point.curve, BlownUp):
-            return point
-        if self.previous is None:
-            return point.curve.plain_point(point, 0.0)
-        return point.curve.behind(point, self.previous.point)
+        return plain_point(point, None if self.previous is None else self.previous.point)
 
     def _clear(self, a: CurvePoint, b: CurvePoint) -> bool:
         """True if a step stays on its curve and its interior could be looked at, or ends where it meets another."""
@@ -273,10 +266,10 @@ class _Follower(Driver):
             # a step too short to be halved
             met = meeting(a, b, self.settings.newton)
             if met is None:
-                where = a.curve.where(a.u)
-                return Arrival(None, Ending(EndReason.NO_MEANING, where, f"{LOST} at {where}"))
+                return lost(a)
             self._meeting = known = (a, b, met)
-        return None if known[2].finer is not None else self._before(known[2].arrival)
+        assert self.previous is not None
+        return None if known[2].finer is not None else known[2].behind(self.previous.point)
 
     def _floating(self, point: CurvePoint) -> str | None:
         """What floats on a motion, in words; None if all is held."""
@@ -286,15 +279,6 @@ class _Follower(Driver):
             loose = point.curve.floating(point.evaluation, point.weights, self.settings.newton.tolerance)
             self._loose = known = (point, loose)
         return known[1]
-
-    def _before(self, arrival: Arrival) -> Arrival:
-        """An arrival whose last point lies behind the last one taken in."""
-        last, before = arrival.point, self.previous
-        if last is None or before is None:
-            return arrival
-        here = last.curve.transfer(before.point.u, before.curve)
-        arclength = before.place + distance(last.u, here, last.weights)
-        return replace(arrival, point=replace(last, arclength=arclength))
 
     def _finer(self, a: CurvePoint, b: CurvePoint) -> Curve | None:
         """The curve with more harmonics, where those of a step leave it open whether a multiplier passes the circle."""

@@ -105,9 +105,6 @@ MERGED = 1e-6
 #: way in the scaled parameter that rounding may account for
 _STILL = 1e-10
 #: what a branch says where it could not look closer
-LOST = (
-    "the doubled part of the motions vanishes, but no period doubling of those of half the period could be solved for"
-)
 UNSEEN = "close to a bifurcation the motions change so fast that something may happen unseen"
 
 
@@ -167,6 +164,13 @@ def regular_point(point: CurvePoint) -> CurvePoint:
     return point if regular is None else regular.blown_up_point(point)
 
 
+def plain_point(point: CurvePoint, before: CurvePoint | None) -> CurvePoint:
+    """A point of a curve as it is followed as one of its motions, behind the last one there."""
+    if not isinstance(point.curve, BlownUp):
+        return point
+    return point.curve.plain_point(point, 0.0) if before is None else point.curve.behind(point, before)
+
+
 def passes_doubling(b: CurvePoint) -> bool:
     """Whether the second of two neighbours lies behind the period doubling that a branch of doubled motions meets."""
     return isinstance(b.curve, BlownUp) and float(b.u[b.curve.size_of_odd]) <= 0.0
@@ -187,6 +191,21 @@ class Meeting:
     doubt: str = ""
     multiplicity: int = 1
     finer: DoubledMotions | None = None
+
+    def behind(self, before: CurvePoint) -> Arrival:
+        """How the march ends, its last point behind another one."""
+        last = self.arrival.point
+        if last is None:
+            return self.arrival
+        arclength = before.arclength + distance(last.u, last.curve.transfer(before.u, before.curve), last.weights)
+        return replace(self.arrival, point=replace(last, arclength=arclength))
+
+
+def lost(a: CurvePoint) -> Arrival:
+    """How a march ends behind a point where the odd part vanishes and nothing was found there."""
+    where = a.curve.where(a.u)
+    detail = f"the odd harmonics vanish, but no period doubling of the motions of half the period was found at {where}"
+    return Arrival(None, Ending(EndReason.NO_MEANING, where, detail))
 
 
 def meeting(a: CurvePoint, b: CurvePoint, newton: NewtonOptions) -> Meeting | None:
