@@ -111,7 +111,7 @@ def resolved_beside(
         except ConvergenceError:
             break
         best = motion, floquet_multipliers(motion.state)
-        if best[1].resolved:
+        if best[1].resolved and best[1].decided:
             break
     return best
 

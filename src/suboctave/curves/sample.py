@@ -104,7 +104,7 @@ class Sample:
         may have and leave them unresolved.
         """
         result = self.method.along(self.state)
-        if result.resolved or not self._at_most_harmonics:
+        if result.vagueness <= 1.0 or not self._at_most_harmonics:
             return result
         finer = resolved_beside(self.curve, self.state, self.point.tangent, result)
         if finer is None:
@@ -134,9 +134,10 @@ class Sample:
     @lazy
     def verdict(self) -> FloquetResult:
         """Multipliers whose errors cover what det J_0 and det J_half say of them."""
-        if self.at_rest or self.refined:
-            return self.floquet
-        result = measures.in_doubt(self.floquet, self._integer_sign, self.half_sign)
+        known = self.floquet
+        if self.at_rest or self.finer is not None:
+            return known
+        result = measures.in_doubt(known, self._integer_sign, self.half_sign)
         return measures.neutral(result) if self.still else result
 
     @property
@@ -155,7 +156,7 @@ class Sample:
         them: the count and the tests of LP, BP and PD then change together.
         """
         count = self.floquet.unstable
-        if not (self.at_rest or self.refined):
+        if not (self.at_rest or self.finer is not None):
             for which, _ in measures.contradicted(self.floquet, self._integer_sign, self.half_sign):
                 count += 1 if abs(self.floquet.multipliers[which]) <= 1.0 else -1
         return count
@@ -165,17 +166,12 @@ class Sample:
         """What the tests of BP, LP and PD look at."""
         return self.point.orientation > 0.0, self.slope > 0.0, self.half_sign > 0.0
 
-    @property
-    def refined(self) -> bool:
-        """Whether the multipliers are those of a motion with more harmonics than the curve's."""
-        _ = self.floquet
-        return self.finer is not None
-
     @lazy
     def half_sign(self) -> float:
         """Sign of det J_half, or, where it is known with more harmonics, that of prod (1 + mu)."""
-        if self.refined:
-            return float(self.floquet.symmetric[0, 1])
+        known = self.floquet
+        if self.finer is not None:
+            return float(known.symmetric[0, 1])
         return Factor.of(self.state.half_jacobian).sign
 
     @lazy

@@ -37,10 +37,11 @@ def _known_within(mu, error):
 
 @kernel()
 def _off_the_circle(mu, errors):
-    """Largest modulus minus one, whether all are off the circle by more than their errors, how many are outside, and
-    the distance of the nearest one.
+    """Largest modulus minus one, whether all are off the circle by more than their errors, how many are outside, the
+    distance of the nearest one, and the largest error of one that may decide, in units of that up to which it is
+    resolved.
     """
-    largest, decided, outside, nearest = -np.inf, True, 0, np.inf
+    largest, decided, outside, nearest, vagueness = -np.inf, True, 0, np.inf, 0.0
     for i in range(mu.shape[0]):
         beyond = abs(mu[i]) - 1.0
         if not (beyond <= largest or math.isnan(largest)):
@@ -48,7 +49,9 @@ def _off_the_circle(mu, errors):
         decided = decided and abs(beyond) > _known_within(mu[i], errors[i])
         outside += beyond > 0.0
         nearest = min(nearest, abs(beyond))
-    return largest, decided, outside, nearest
+        if not beyond + errors[i] <= _DECIDING - 1.0:
+            vagueness = max(vagueness, errors[i] / (RESOLVED * max(1.0, beyond + 1.0)))
+    return largest, decided, outside, nearest, vagueness
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -103,8 +106,8 @@ class FloquetResult:
         return float(np.max(self.errors[deciding] if deciding.any() else self.errors))
 
     @lazy
-    def _verdict(self) -> tuple[float, bool, int, float]:
-        result: tuple[float, bool, int, float] = _off_the_circle(self.multipliers, self.errors)
+    def _verdict(self) -> tuple[float, bool, int, float, float]:
+        result: tuple[float, bool, int, float, float] = _off_the_circle(self.multipliers, self.errors)
         return result
 
     @property
@@ -143,7 +146,7 @@ class FloquetResult:
         """Whether the errors of multipliers are so large that there is no verdict."""
         return bool(no_verdict(self.multipliers, self.errors).any())
 
-    @lazy
+    @property
     def resolved(self) -> bool:
         """Whether the multipliers that may decide are known to a share of themselves: the error of a multiplier of the
         corrected motion goes with the square of the shift that is stated.
@@ -153,11 +156,7 @@ class FloquetResult:
     @property
     def vagueness(self) -> float:
         """Largest error of a multiplier that may decide, in units of that up to which it is resolved."""
-        if not self.applicable:
-            return math.inf
-        size = np.abs(self.multipliers)
-        deciding = size + self.errors > _DECIDING
-        return float((self.errors / (RESOLVED * np.maximum(1.0, size)))[deciding].max(initial=0.0))
+        return self._verdict[4]
 
     @property
     def undamped(self) -> bool:

@@ -370,6 +370,8 @@ _SLACK = 1e-7
 #: the same before the first point of a curve, which may be the bifurcation as its multipliers tell, not its harmonics,
 #: and beyond ends at which multipliers, if these tell of the kind, leave it open on which side they lie
 _BEFORE = 1e-2
+#: bisections between motions with more harmonics than their curve
+_OF_FINER = 6
 #: corrections of a place on a step, at most, and one that settles it, as a share of the step
 _ROUNDS, _SETTLED = 20, 1e-12
 
@@ -401,9 +403,11 @@ def locate(
     After so many bisections the bracket is taken for the answer. `begins`: whether the curve begins with the first
     neighbour; what lies right before it then belongs to no other step.
     """
-    found = _located(kind, a, b, newton, bisections, begins)
+    # where tests are those of motions with more harmonics, halving their brackets does not lead to what fewer have
+    finer = a.finer is not None or b.finer is not None
+    found = _located(kind, a, b, newton, min(bisections, _OF_FINER) if finer else bisections, begins)
     missed = found is None or found.solution is None
-    return (_beside(kind, a, b) or found) if missed and kind.counted else found
+    return (_beside(kind, a, b) or found) if missed and (kind.counted or finer) else found
 
 
 def _beside(kind: BifurcationKind, a: Sample, b: Sample) -> Located | None:
