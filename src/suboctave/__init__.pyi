@@ -67,7 +67,7 @@ from .harmonic.condensed import condense as condense
 from .maps.isolas.map import IsolaMap as IsolaMap, isola_map as isola_map
 from .maps.isolas.margin import DesignMargin as DesignMargin, design_margin as design_margin
 from .maps.isolas.result import Isola as Isola, Isolas as Isolas
-from .maps.isolas.search import find_isolas as find_isolas
+from .maps.isolas.verb import find_isolas as find_isolas
 from .maps.regimes.map import RegimeMap as RegimeMap
 from .maps.regimes.verb import regime_map as regime_map
 from .model import (

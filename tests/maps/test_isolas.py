@@ -6,6 +6,8 @@ and 9 harmonics alike; a Duffing oscillator under a load `F0 (1 - q^2)` against 
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import fsolve
@@ -17,7 +19,7 @@ from suboctave.curves.identity import lies_on, mirrored
 from suboctave.interruption import Interruption
 from suboctave.maps import catalogue
 from suboctave.maps.catalogue import Catalogue, SearchRange
-from suboctave.maps.isolas.result import Isolas
+from suboctave.maps.isolas.result import IsolaEnd, Isolas
 from suboctave.maps.isolas.search import Search
 
 OMEGA = (1.3, 4.5)
@@ -44,6 +46,25 @@ def test_the_isola_of_the_reference_oscillator(isolas):
     (cusp,) = curve.bifurcations["CP"]
     assert (cusp.omega, cusp.parameter("j")) == pytest.approx((2.022540, 0.176778), abs=2e-6)
     assert "isola centre" in repr(isolas)
+
+
+def test_an_end_at_zero_is_an_end(isolas):
+    """`if isola.born:` asks whether it is known, not whether the parameter is zero there."""
+    (isola,) = isolas
+
+    def moved(end, value):
+        orbit = replace(end.orbit, values={**end.orbit.values, "j": value})
+        return IsolaEnd.of(replace(end, orbit=orbit), "j", end.kind == "isola_centre")
+
+    born, merges = moved(isola.born, 0.0), moved(isola.merges, 0.0)
+    assert born
+    assert (float(born), born == 0.0, born < 0.1, f"{born:.3f}", born + 1.0) == (0.0, True, True, "0.000", 1.0)
+    # two ends at one value of the parameter are two
+    assert born != merges
+    assert len({born, merges}) == 2
+    assert moved(isola.born, 0.0) == born
+    assert hash(born) == hash(0.0)
+    assert Isolas([replace(isola, ends=(None, born))], isola.system, "j", (0.0, 1.0), OMEGA)[0].born is born
 
 
 @pytest.mark.parametrize(("gap", "folds"), [(0.3, (2.082514, 2.785675)), (0.5, (2.200149, 2.514902))])
@@ -194,6 +215,54 @@ def test_an_isola_of_nonlinear_damping(damped, bounds):
 
 
 @pytest.mark.slow
+def test_an_isola_goes_on_where_its_limit_points_were_lost(isolas):
+    """Its curves cut off amid its range, as by a corner that could not be passed: followed anew, it is the same isola,
+    once.
+    """
+    (isola,) = isolas
+    search = Search(Catalogue(isola.system, "j", (0.0, 1.0), SearchRange(*OMEGA), "adaptive", isola.options, 64))
+    search.catalogue.curves += isolas.limit_points
+    for piece in isola.pieces:
+        kept = [node for node, value in zip(piece.nodes, piece.values, strict=True) if value > 0.26]
+        ends = tuple(None if end is None or float(end.parameter("j")) < 0.26 else end for end in piece.ends)
+        search.catalogue.pieces.append(replace(piece, nodes=tuple(kept), ends=ends))
+    search.meet(isola.at(0.3), 0.3)
+    (found,) = search.result()
+    assert found.range == pytest.approx(isola.range, abs=2e-6)
+    assert found.merges.omega == pytest.approx(isola.merges.omega, abs=2e-6)
+    assert found.notes == ()
+
+
+def one_sided():
+    """A mass beside a soft stop: two isolas of 3T over the gap have cusps along their limit points."""
+    stop = so.ElasticStop(0, 6.0, "g")
+    return so.System(1.0, 0.05, 1.0, [stop], [so.HarmonicLoad(0, 0.5)], parameters={"g": 0.1})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("omega", "value", "born", "at", "folds"),
+    [
+        ((1.8, 2.3), 0.1, 0.267609, 0.1, (1.90859, 2.05735)),
+        # there it leaves the range of omega
+        ((3.0, 4.0), 0.05, 0.407511, 0.0, (4.02681, 5.41650)),
+    ],
+)
+def test_a_cusp_is_no_end_of_an_isola(omega, value, born, at, folds):
+    """Limit points by `find_subharmonics` at single gaps; what is followed is confirmed by shooting."""
+    given = {"values": [value], "search": (3,), "depth": 0, "levels": ()}
+    (isola,) = so.find_isolas(one_sided(), omega, "g", (0.0, 0.45), **given)
+    assert isola.nu == 3
+    assert isola.range[0] == 0.0
+    assert float(isola.born) == pytest.approx(born, abs=2e-6)
+    loop = isola.at(at)
+    assert loop.closed
+    places = sorted(item.omega for item in loop.bifurcations["LP"])
+    assert (places[0], places[-1]) == pytest.approx(folds, abs=2e-5)
+    assert all(so.verify(loop.orbits[place]).agrees for place in (3, len(loop) // 2, len(loop) - 4))
+
+
+@pytest.mark.slow
 def test_two_isolas_that_join():
     """They are told apart, each closed branch belongs to one of them, and it says where they join."""
     first, second = so.find_isolas(reference(p=1.7), (1.8, 4.5), "j", (0.3, 1.0), values=2)
@@ -252,6 +321,13 @@ def test_a_closed_branch_that_was_interrupted_is_not_kept(isolas, monkeypatch):
     assert part.interruption == Interruption(60.0)
     assert not part.closed
     assert value not in isola.known
+    # nor is anything read off it
+    for reading in (lambda: isola.stable_ranges(value), lambda: isola.plot(values=[value])):
+        with monkeypatch.context() as patched:
+            looks = iter(range(10**6))
+            patched.setattr(interruption, "monotonic", lambda looks=looks: float(next(looks)))
+            with pytest.raises(so.TimeLimitError), interruption.time_limit(60):
+                reading()
     whole = isola.at(value)
     assert whole.closed
     assert len(whole) > len(part)
@@ -265,15 +341,35 @@ def test_wherever_a_time_limit_falls_the_search_says_so(share, monkeypatch, look
     found = small_search(share * looks_of_a_search)
     assert found.interruption == Interruption(share * looks_of_a_search)
     assert any("the time limit of" in note for note in found.notes)
+    assert found.summary.startswith("Incomplete, the time limit of")
+    assert "values of F" in found.summary.split("Not looked at: ")[1]
     assert not any(branch.interrupted for isola in found for branch in isola.known.values())
     assert not any(curve.interrupted for curve in (*found.limit_points, *found.doublings))
 
 
-def small_search(seconds=None):
+def test_the_periods_that_were_searched_for_are_named():
+    """Also those of which nothing was found."""
+    found = small_search(search=(3, 5), seeds=so.Seeds(2, 1, 1))
+    assert list(found) == []
+    assert found.summary.startswith("No isola of T, 3T and 5T motions was found for F from 0.2 to 1")
+    assert "a search for 3T motions at 2 values of F and a search for 5T motions at 2 values of F" in found.summary
+
+
+def small_search(seconds=None, search=(), seeds=None):
     spring = so.PolynomialSpring(0, {3: "k3"})
     system = so.System(1.0, 0.05, 1.0, [spring], [so.HarmonicLoad(0, "F")], {"F": 1.0, "k3": 1.0})
     return so.find_isolas(
-        system, (0.5, 3.0), "F", (0.2, 1.0), 3, values=2, depth=0, levels=(), search=(), seconds=seconds
+        system,
+        (0.5, 3.0),
+        "F",
+        (0.2, 1.0),
+        3,
+        values=2,
+        depth=0,
+        levels=(),
+        search=search,
+        seeds=seeds,
+        seconds=seconds,
     )
 
 
@@ -396,7 +492,7 @@ def test_a_true_isola_of_unsymmetric_motions_stays():
 def test_what_hangs_on_an_isola_is_part_of_it():
     """The symmetric 3T isola at F = 200 has four pitchforks; the loops between them turn back there, it does not."""
     system = so.library.duffing(c=0.1).with_parameters(F=200.0)
-    start = so.frequency_response(system, (3.0, 9.0), subharmonic=3).orbits[5]
+    start = so.periodic_orbit(system, 3.1987, [5.656, -25.978], 3)
     isola = so.continue_branch(start, "omega", (1.0, 5.0))
     assert isola.closed
     assert len(isola.bifurcations["BP"]) == 4

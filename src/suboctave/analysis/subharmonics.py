@@ -1,28 +1,25 @@
 """Sub-harmonic motions that come from no period doubling: searched for by resonance, or from a state in time.
 
 Such a motion answers a load of frequency omega mostly at `k omega / nu`, near a nonlinear resonance there: a free
-vibration `A phi cos(k omega t / nu)` in a linear mode phi whose amplitude makes that its own frequency,
-
-    phi . [K - (k omega / nu)^2 M] phi A + (1 / pi) int_0^{2 pi} phi . f(A phi cos theta) cos theta dtheta = 0,
-
-and then with its shape free as well. Seeds are such vibrations, in several phases against the load, on top of the
-linear response; Newton's method decides whether there is a motion nearby. A branch is followed from each new one, both
-ways.
+vibration that continues a linear mode and whose size makes `k omega / nu` its own frequency (`free_vibrations`), k < 2
+nu. Seeds are such vibrations, in several phases against the load, on top of the linear response; Newton's method
+decides whether there is a motion nearby. A branch is followed from each new one, both ways.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import gcd
 from typing import Any, Unpack
 
 import numpy as np
 
+from suboctave.analysis.free_vibrations import Backbone, backbones
 from suboctave.analysis.options import CurveOptions, CurveRun, SearchOptions, settings_of
 from suboctave.arguments import checked
 from suboctave.continuation import CurvePoint, NewtonOptions
-from suboctave.continuation.linear import length, one_thread
+from suboctave.continuation.linear import one_thread
 from suboctave.continuation.newton import correct
 from suboctave.continuation.problem import Array
 from suboctave.curves.follow import both_ways
@@ -33,8 +30,6 @@ from suboctave.curves.sample import Sample
 from suboctave.curves.starts import Harmonics, linear_response, make_curve, start_point
 from suboctave.curves.trace import Trace
 from suboctave.errors import ConvergenceError, InputError
-from suboctave.harmonic.basis import HarmonicBasis
-from suboctave.harmonic.evaluation import HarmonicBalance
 from suboctave.harmonic.linear_part import LinearPart
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.interruption import Interruption, limited, pass_on
@@ -47,7 +42,6 @@ from suboctave.timedomain import integrate
 
 #: part of a motion at fractions of omega below which it is taken for a motion of the load's period
 _SUBHARMONIC = 1e-3
-_FREE_ITERATIONS = 12
 
 
 @checked
@@ -63,8 +57,8 @@ class Seeds:
         Linear modes tried, from the lowest.
     """
 
-    frequencies: int = 16
-    phases: int = 6
+    frequencies: int = 40
+    phases: int = 3
     modes: int = 3
 
     def __post_init__(self) -> None:
@@ -258,10 +252,11 @@ def _motions(curve: MotionProblem, seeds: Seeds, run: CurveRun, report: Report) 
     first, last = run.ends
     # away from the ends, where branches may just end
     values = first + (last - first) * (np.arange(seeds.frequencies) + 0.5) / seeds.frequencies
+    free = backbones(curve, seeds.modes, 2.0 * max(run.ends))
     for number, value in enumerate(values):
         report(number / len(values), f"looking at {curve.where(np.array([value]))}")
         met: list[PeriodicOrbit] = []
-        for guess in _guesses(curve, float(value), seeds):
+        for guess in _guesses(curve, float(value), free, seeds):
             try:
                 solved = correct(curve, guess, curve.parameter, curve.weights(guess, 0.0), patient)
             except ConvergenceError:
@@ -281,71 +276,28 @@ def _motions(curve: MotionProblem, seeds: Seeds, run: CurveRun, report: Report) 
                 yield point
 
 
-def _guesses(curve: MotionProblem, value: float, seeds: Seeds) -> Iterator[Array]:
-    """Free vibrations at a fraction of omega on top of the linear response."""
-    balance = curve.balance
-    nu = balance.basis.nu
-    base = linear_response(curve, value)
-    for k in range(1, nu):
-        if gcd(k, nu) > 1:
-            continue
-        for shape in _modes(balance)[: seeds.modes]:
-            for cosines in _resonant(curve, value * k / nu, shape):
-                for phase in 2.0 * np.pi * k / nu * np.arange(seeds.phases) / seeds.phases:
-                    x = curve.split(base)[0].copy()
-                    x[2 * k - 1] += np.cos(phase) * cosines
-                    x[2 * k] += np.sin(phase) * cosines
-                    yield curve.join(x, value)
+def _guesses(curve: MotionProblem, value: float, free: Sequence[Backbone], seeds: Seeds) -> Iterator[Array]:
+    """Free vibrations at fractions of omega, in several phases, on top of the linear response."""
+    nu, harmonics = curve.balance.basis.nu, curve.balance.basis.harmonics
+    base = curve.split(linear_response(curve, value))[0]
+    # a shift by a period of the load turns one phase into another
+    phases = 2.0 * np.pi / nu * np.arange(seeds.phases) / seeds.phases
+    for k in (k for k in range(1, 2 * nu) if gcd(k, nu) == 1):
+        for motion in _vibrating(free, value * k / nu, k < nu):
+            # what oscillates in it, in the basis of the longer period
+            fitting = motion[1 : harmonics // k + 1]
+            places = k * np.arange(1, len(fitting) + 1)
+            for phase in phases:
+                turns = (places // k * phase)[:, None]
+                x = base.copy()
+                x[0] = motion[0]
+                x[2 * places - 1] += np.cos(turns) * fitting
+                x[2 * places] += np.sin(turns) * fitting
+                yield curve.join(x, value)
 
 
-def _modes(balance: HarmonicBalance) -> list[Array]:
-    """Undamped linear modes in the unknowns, unit length in the masses' weights, the slowest first."""
-    from scipy.linalg import eigh
-
-    mass, _, stiffness = balance.linear.equation_of_motion()
-    _, vectors = eigh(0.5 * (stiffness + stiffness.T), 0.5 * (mass + mass.T))
-    shapes = list((np.array([balance.linear.expand(unit) for unit in np.eye(balance.size)]) @ vectors).T)
-    weight = balance.scales()[0]
-    return [s / length(weight * s) for s in shapes if length(weight * s) > 0.0]
-
-
-def _resonant(curve: MotionProblem, frequency: float, shape: Array) -> list[Array]:
-    """Free vibrations at a frequency by their first harmonic, cosines of each DOF: those that continue a linear mode.
-
-    Where there are none some guesses in the shape of the mode.
-    """
-    single = HarmonicBalance(
-        curve.balance.system, HarmonicBasis(5), curve.balance.values, curve.balance.linear, curve.balance.samples
-    )
-
-    def pull(cosines: Array) -> tuple[Array, Array]:
-        """What is left of the first harmonic's cosines without loads, and its derivative."""
-        x = np.zeros((single.basis.size, single.size))
-        x[1] = cosines
-        state = single.at(x, frequency)
-        rest = state.residual.reshape(x.shape) + state.load
-        own = slice(single.size, 2 * single.size)
-        return rest[1], state.jacobian[own, own]
-
-    unit = curve.reference or 1.0
-    sizes = unit * np.geomspace(1e-3, 1e4, 71)
-    values = np.array([float(shape @ pull(size * shape)[0]) / size for size in sizes])
-    crossed = np.flatnonzero(np.isfinite(values[1:]) & (values[:-1] * values[1:] < 0.0))
-    crossings = [float(sizes[i] + (sizes[i + 1] - sizes[i]) * values[i] / (values[i] - values[i + 1])) for i in crossed]
-    if not crossings:
-        return [float(size) * shape for size in unit * np.array([0.3, 1.0, 3.0, 10.0])]
-    return [_free(pull, size * shape) for size in crossings]
-
-
-def _free(pull: Callable[[Array], tuple[Array, Array]], start: Array) -> Array:
-    """The free vibration near one in the shape of a linear mode, which couples to the others; the start if none is."""
-    a = start
-    for _ in range(_FREE_ITERATIONS):
-        rest, slope = pull(a)
-        if not (np.isfinite(rest).all() and np.isfinite(slope).all()):
-            return start
-        step = np.asarray(np.linalg.lstsq(slope, rest, rcond=None)[0], dtype=np.float64)
-        a = a - step * min(1.0, 0.5 * length(a) / (length(step) or 1.0))
-        if length(step) <= 1e-6 * length(a):
-            return a if length(a) >= 0.1 * length(start) else start
-    return start
+def _vibrating(free: Sequence[Backbone], frequency: float, slow: bool) -> Iterator[Array]:
+    """The free vibrations of a frequency; for `slow` ones, where there are none, some whose frequency is another."""
+    for backbone in free:
+        resonant = backbone.at(frequency)
+        yield from resonant or (backbone.typical if slow else ())

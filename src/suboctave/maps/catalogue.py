@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -23,7 +23,7 @@ from suboctave.analysis.track import track
 from suboctave.arguments import checked
 from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.continuation import NewtonOptions
-from suboctave.curves.identity import gap_to, lies_on
+from suboctave.curves.identity import Relation, gap_to, lies_on, relation
 from suboctave.curves.junction import period_name
 from suboctave.curves.sample import Sample
 from suboctave.curves.starts import Harmonics, harmonics_of, make_curve, own_linear_part, rule_of, start_point
@@ -48,6 +48,8 @@ if TYPE_CHECKING:
 _MARGIN = 0.02
 #: frequencies of one bifurcation located twice differ by less, relatively
 _SAME_OMEGA = 2e-5
+#: distance from a curve of limit points, relative to omega, within which the limit point on it is solved for
+_BESIDE = 1e-3
 #: share of a closed branch's length by which points are beside a bifurcation, not at it
 _CLEAR = 1e-4
 #: errors of verbs that start from a bifurcation
@@ -260,7 +262,16 @@ class Catalogue(Work):
         alike = (p for p in self.pieces if p.kind == item.kind and p.nu == item.orbit.basis.nu and p.contains(value))
         gaps = {piece: gap_to(item.orbit, piece.nodes, self.name, images=True) for piece in alike}
         near = {piece: gap for piece, gap in gaps.items() if gap is not None}
-        return min(near, key=near.__getitem__, default=None)
+        if near or item.kind != "LP":
+            return min(near, key=near.__getitem__, default=None)
+        # beside a cusp or a corner a few points say little of what lies between them: what is located there decides
+        for piece in sorted(gaps, key=lambda piece: abs(float(piece.across(value)) - item.omega)):
+            if abs(float(piece.across(value)) - item.omega) > _BESIDE * item.omega:
+                break
+            with suppress(ConvergenceError):
+                if relation(item.orbit, piece.solve_at(value).orbit) is not Relation.OTHER:
+                    return piece
+        return None
 
     def known(self, item: Bifurcation, value: float) -> MonotonePiece | None:
         """The piece that a bifurcation lies on, followed over the parameter if it is new; None if that fails."""

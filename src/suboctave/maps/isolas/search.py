@@ -1,59 +1,52 @@
-"""`find_isolas`: closed branches that no sweep leads to, over a design parameter.
-
-1. At several values of the parameter the response is followed, with the branches that bifurcate from it
-   (`_from_responses`; where that leads to no isola, responses under other loads and resonances).
-2. Every limit point met is followed over the parameter, through its extrema; every period doubling as well.
-3. Where the curve of limit points has a definite extremum a closed branch shrinks to a point. Limit points at the
-   values of 1. that lie on none of the branches met there lie on others.
-4. A branch through such a limit point is followed. If it closes, the search finds the range in which it does.
-
-None of this depends on the value that the parameter happens to have, nor begins at an extremum of period doublings,
-where sub-harmonic motions appear beside their parent (Alcorta et al., Nonlinear Dynamics 98, 2019, section 3.6, begin
-there).
+"""What a search for isolas knows, and the range of the design parameter in which a closed branch is isolated.
 
 As the design parameter q changes, a closed branch can change its nature only where one of its limit points meets
 another (an extremum of q along their curve, or a cusp) or, for sub-harmonic motions, where period doublings of the
 parent appear. From a value at which the branch is detached one goes on to the next such event, and follows the branch
 again behind those that may concern it. At the end of the range it is followed once more: what no known event accounts
 for is located by bisection and noted.
+
+An isola ends in a centre, where it meets another branch, or at the bounds, nowhere else. A cusp takes two of its limit
+points away and leaves the branch; a curve of limit points that could be followed no further says nothing of the branch
+either. Behind both the branch is reached through another limit point, or, where none is known there, from its own
+motions, each followed over q at its own frequency.
+
+Two branches are one isola if they share a limit point at some value, or a motion: a curve of limit points that was
+followed twice makes no second isola.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any, Unpack
 
 import numpy as np
 
 from suboctave.analysis.branches import continue_branch
-from suboctave.analysis.options import SearchOptions
-from suboctave.analysis.subharmonics import Seeds, check_seeds
 from suboctave.bifurcation.bifurcation import TrackedEvent
+from suboctave.continuation.ending import EndReason
 from suboctave.curves.identity import lies_on
 from suboctave.curves.junction import period_name
-from suboctave.curves.starts import Harmonics
-from suboctave.errors import ConvergenceError, InputError, is_number
+from suboctave.errors import ConvergenceError
+from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.interruption import pass_on
-from suboctave.maps.catalogue import Catalogue, branch_through, checked_orders, checked_values, listed
-from suboctave.maps.isolas.responses import Responses, UnderOtherLoads, followed_doublings
+from suboctave.maps.catalogue import Catalogue, branch_through
 from suboctave.maps.isolas.result import Isola, IsolaEnd, Isolas
 from suboctave.maps.pieces import MonotonePiece
-from suboctave.model.inputs import check_count, timed
-from suboctave.model.system import System
-from suboctave.options import with_options
 from suboctave.results.branch import Branch
-from suboctave.workers import check_workers
 
 #: share of the work that the responses make, for progress
-_PREPARATION = 0.6
+PREPARATION = 0.6
 #: events that are closer, in units of the parameter's range, are met together
 _TOGETHER = 1e-7
 #: halvings of the interval in which a branch ceases to be detached for no known reason
 _BISECTIONS = 10
 #: share of the way to an event, before it, at which the branch is followed once more
 _BEFORE = 1e-3
+#: shares of the frequencies of a closed branch at which its motions are followed over the parameter, on both its sides
+_CARRYING = (0.5, 0.25, 0.75)
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,18 +63,44 @@ class Loop:
     detached: bool
 
 
+@dataclass
+class Stage:
+    """A part of a search in words, at how many places it looks, and at how many it has; `leads` to limit points."""
+
+    words: str
+    planned: int
+    done: int = 0
+    leads: bool = True
+
+    @property
+    def so_far(self) -> str:
+        """What has been looked at."""
+        return self.words.format(self.planned if self.done == self.planned else f"{self.done} of {self.planned}")
+
+    @property
+    def left(self) -> str:
+        """What has not."""
+        return self.words.format(self.planned - self.done)
+
+
 class Search:
     """What a search for isolas knows: curves of bifurcations, branches at values, and the isolas so far.
 
     values
         Values of the design parameter at which responses are followed.
+    periods
+        Periods of motions that are looked for, in periods of the load.
+    stages
+        What the search has looked at, and what it is still to look at.
     met
         Branches that bifurcate from a response, or are one, by the value of the parameter.
     """
 
-    def __init__(self, catalogue: Catalogue, values: Sequence[float] = ()) -> None:
+    def __init__(self, catalogue: Catalogue, values: Sequence[float] = (), periods: Iterable[int] = ()) -> None:
         self.catalogue = catalogue
         self.values = tuple(values)
+        self.periods = set(periods)
+        self.stages: list[Stage] = []
         self.met: dict[float, list[Branch]] = {}
         self.isolas: list[Isola] = []
         #: pieces that limit points of an isola lie on, and between which values
@@ -112,21 +131,26 @@ class Search:
         """A branch that is detached exists over some range, unless it is known; any other is known from now on."""
         if any(self.isola_on(piece, loop.value) for piece in loop.pieces):
             return
-        if loop.detached and loop.pieces:
-            catalogue, value = self.catalogue, loop.value
-            catalogue.progress(_PREPARATION, f"closed branch at {catalogue.name} = {value:.6g}")
-            # to begin with at a single value
-            reasons = ("not followed to lower values", "not followed to higher values")
-            isola = Isola(
-                catalogue.system, catalogue.name, (catalogue.omega.low, catalogue.omega.high), (None, None),
-                (value, value), reasons, loop.pieces, catalogue.options, (), {value: loop.branch},
-            )  # fmt: skip
-            low, high = (_Direction(upper, isola, self) for upper in (False, True))
-            self.isolas.append(isola)
-            for direction in (low, high):
-                direction.settle(loop)
-        else:
+        if not (loop.detached and loop.pieces):
             self.attach(loop)
+            return
+        known = self.isola_of(loop)
+        if known is not None:
+            known.pieces = tuple(dict.fromkeys([*known.pieces, *loop.pieces]))
+            self.hold(known, loop, loop.value, loop.value)
+            return
+        catalogue, value = self.catalogue, loop.value
+        catalogue.progress(PREPARATION, f"closed branch at {catalogue.name} = {value:.6g}")
+        # to begin with at a single value
+        reasons = ("not followed to lower values", "not followed to higher values")
+        isola = Isola(
+            catalogue.system, catalogue.name, (catalogue.omega.low, catalogue.omega.high), (None, None),
+            (value, value), reasons, loop.pieces, catalogue.options, (), {value: loop.branch},
+        )  # fmt: skip
+        low, high = (_Direction(upper, isola, self) for upper in (False, True))
+        self.isolas.append(isola)
+        for direction in (low, high):
+            direction.settle(loop)
 
     def _starts(self, values: Sequence[float]) -> Iterator[tuple[MonotonePiece, float]]:
         """Limit points that may lie on an isola: beside centres, then those that no branch met explains."""
@@ -154,27 +178,55 @@ class Search:
                     continue
                 value = event.parameter(name)
                 beyond, _ = next(self.critical(piece.nu, value, not upper), (bounds[0 if upper else 1], []))
-                yield piece, 0.5 * (value + beyond)
+                # the curve may have been followed less far
+                reach = max(beyond, piece.low) if upper else min(beyond, piece.high)
+                yield piece, 0.5 * (value + reach)
 
+    # ------------------------------------------------------------------------------------------------- what is said
     def result(self) -> Isolas:
         """The isolas and the curves that were followed, with the outcome in one sentence."""
         catalogue, isolas = self.catalogue, self.isolas
         (low, high), (first, last) = catalogue.bounds, catalogue.omega
         limit_points, doublings = ([c for c in catalogue.curves if c.kind == kind] for kind in ("LP", "PD"))
         where = f"for {catalogue.name} from {low:g} to {high:g}, omega from {first:g} to {last:g}"
-        begun = f"the responses at {len(self.values)} values of {catalogue.name}"
-        followed = f"{len(limit_points)} curves of limit points from {begun}"
-        if isolas:
-            summary = f"{len(isolas)} isola{'s' * (len(isolas) > 1)} {where}; {followed}."
+        looked = _listed(stage.so_far for stage in self.stages if stage.leads and stage.done) or "nothing"
+        followed = f"{len(limit_points)} curves of limit points from {looked}"
+        count = f"{len(isolas) or 'no'} isola{'s' * (len(isolas) != 1)}"
+        if catalogue.interruption is not None:
+            missing = _listed(stage.left for stage in self.stages if stage.done < stage.planned)
+            summary = (
+                f"Incomplete, {catalogue.interruption}: {count} so far {where}; {followed}. Not looked at: {missing}."
+            )
+        elif isolas:
+            summary = f"{count} {where}; {followed}."
         else:
-            periods = " and ".join(period_name(nu) for nu in sorted({p.nu for p in catalogue.limit_points} | {1}))
+            known = {p.nu for p in catalogue.limit_points} | {1} | self.periods
+            periods = _listed(period_name(nu) for nu in sorted(known))
             summary = f"No isola of {periods} motions was found {where}: {followed} show none."
+        self._note_breaks()
         asked = catalogue.system, catalogue.name, catalogue.bounds, (first, last)
         return Isolas(isolas, *asked, limit_points, doublings, catalogue.notes, summary, catalogue.interruption)
 
+    def _note_breaks(self) -> None:
+        """Note where curves of limit points could be followed no further, unless another one passes there."""
+        name = self.catalogue.name
+        curves = [curve for curve in self.catalogue.curves if curve.kind == "LP" and len(curve)]
+        for curve in curves:
+            for end, ending in zip((0, -1), curve.endings, strict=False):
+                orbit = curve.orbits[end]
+                if not ending.early or ending.interruption is not None:
+                    continue
+                if any(c.nu == curve.nu and lies_on(orbit, c.points, name, True) for c in curves if c is not curve):
+                    continue
+                self.catalogue.note(
+                    f"a curve of limit points of {period_name(curve.nu)} motions was followed no further than omega = "
+                    f"{orbit.omega:.6g}, {name} = {orbit.values[name]:.6g} ({ending}): isolas that lie beyond may be "
+                    "missing"
+                )
+
     # ------------------------------------------------------------------------------------- branches at one value
-    def through(self, piece: MonotonePiece, value: float) -> Loop | None:
-        """The branch through a limit point at a value; None where it cannot be followed."""
+    def through(self, piece: MonotonePiece, value: float, noted: bool = True) -> Loop | None:
+        """The branch through a limit point at a value; None, which is noted, where it cannot be followed."""
         catalogue = self.catalogue
         same = [other for other in catalogue.limit_points if other.curve is piece.curve]
         try:
@@ -182,24 +234,67 @@ class Search:
             branch = branch_through(item, catalogue.omega, catalogue.name, same, catalogue.options)
         except ConvergenceError as failure:
             where = f"omega = {float(piece.across(value)):.6g}, {catalogue.name} = {value:.6g}"
-            catalogue.note(f"the branch at {where} could not be followed: {failure}")
+            if noted:
+                catalogue.note(f"the branch at {where} could not be followed: {failure}")
             return None
         pass_on(branch.interruption)
         return self.of(branch, value, piece)
 
+    def carried(self, loop: Loop, value: float) -> Loop | None:
+        """The branch at another value that motions of a loop lead to, each followed over the parameter at its own
+        frequency; None where none comes there without turning back.
+        """
+        catalogue, name = self.catalogue, self.catalogue.name
+        for orbit in _amid(loop.branch):
+            with suppress(ConvergenceError):
+                path = continue_branch(orbit, name, (loop.value, value), **catalogue.options)
+                pass_on(path.interruption)
+                reached = path.orbits[-1]
+                if reached.values[name] != value or path.bifurcations["LP"]:
+                    continue
+                branch = continue_branch(
+                    reached, "omega", catalogue.omega.holding([reached.omega]), **catalogue.options
+                )
+                pass_on(branch.interruption)
+                return self.of(branch, value)
+        return None
+
     def of(self, branch: Branch, value: float, *known: MonotonePiece) -> Loop:
         """A branch at a value, or the closed one that it hangs on; `known` are pieces of the given branch."""
+        branch = self._whole(branch, value)
         carrier = self.catalogue.carrier(branch, value, self.met.get(value, ()))
         if carrier is None or carrier is branch:
             return Loop(value, branch, self.pieces_on(branch, value, *known), carrier is branch)
         self._explained |= {(value, piece) for piece in known}
         return Loop(value, carrier, self.pieces_on(carrier, value), True)
 
+    def _whole(self, branch: Branch, value: float) -> Branch:
+        """A branch that leaves the range, followed an octave beyond: it may close there. What is open is noted."""
+        if branch.closed or branch.junctions or not len(branch):
+            return branch
+        catalogue = self.catalogue
+        if any(ending.reason in (EndReason.RANGE_END, EndReason.LEFT_RANGE) for ending in branch.endings):
+            low, high = catalogue.omega.around
+            if low < branch.omega.min() or branch.omega.max() < high:
+                ends = min(low, float(branch.omega.min())), max(high, float(branch.omega.max()))
+                with suppress(ConvergenceError):
+                    branch = continue_branch(branch.orbits[len(branch) // 2], "omega", ends, **catalogue.options)
+                    pass_on(branch.interruption)
+        if branch.nu > 1 and not branch.closed and not branch.junctions:
+            middle = branch.orbits[len(branch) // 2]
+            catalogue.note(
+                f"whether the {period_name(branch.nu)} branch at omega = {middle.omega:.6g}, {catalogue.name} = "
+                f"{value:.6g} is an isola is open, for it does not close between omega = {branch.omega.min():.6g} and "
+                f"{branch.omega.max():.6g} ({branch.ended}): a wider range of omega may tell"
+            )
+        return branch
+
     def pieces_on(self, branch: Branch, value: float, *known: MonotonePiece) -> tuple[MonotonePiece, ...]:
         """The pieces that a branch's limit points lie on, each once, those that are known first."""
         pieces = (self.catalogue.known(item, value) for item in branch.bifurcations["LP"])
         return tuple(dict.fromkeys([*known, *(piece for piece in pieces if piece is not None)]))
 
+    # ----------------------------------------------------------------------------------------- which isola is which
     def hold(self, isola: Isola, loop: Loop, one: float, other: float) -> None:
         """Between two values an isola has limit points on the pieces of a loop."""
         self._held += [(isola, piece, min(one, other), max(one, other)) for piece in loop.pieces]
@@ -208,6 +303,31 @@ class Search:
         """The isola that a piece's limit point at a value lies on, as far as isolas are known."""
         held = (isola for isola, p, low, high in self._held if p is piece and low <= value <= high and value in isola)
         return next(held, None)
+
+    def isola_of(self, loop: Loop, own: Isola | None = None) -> Isola | None:
+        """The isola that a detached branch belongs to, by its limit points or by its motions; not `own`."""
+        for piece in loop.pieces:
+            isola = self.isola_on(piece, loop.value)
+            if isola is not None and isola is not own:
+                return isola
+        middle = loop.branch.orbits[len(loop.branch) // 2]
+        for isola in self.isolas:
+            if isola is own or isola.nu != loop.branch.nu or loop.value not in isola:
+                continue
+            with suppress(ConvergenceError):
+                branch = isola.at(loop.value)
+                pass_on(branch.interruption)
+                if lies_on(middle, branch.points, images=True):
+                    return isola
+        return None
+
+    def absorb(self, isola: Isola, other: Isola) -> None:
+        """Two isolas have turned out to be one: the first takes over from the other, which is no longer listed."""
+        self.isolas.remove(other)
+        isola.followed = {**other.followed, **isola.followed}
+        isola.pieces = tuple(dict.fromkeys([*isola.pieces, *other.pieces]))
+        isola.notes = tuple(dict.fromkeys([*isola.notes, *other.notes]))
+        self._held = [(isola if one is other else one, *held) for one, *held in self._held]  # type: ignore[misc]
 
     def attach(self, loop: Loop) -> None:
         """A branch that is not detached: its limit points at that value are explained."""
@@ -232,6 +352,22 @@ class Search:
         yield from groups.items()
 
 
+def _listed(items: Iterable[str]) -> str:
+    """Items in words: a, b and c."""
+    words = list(items)
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+
+
+def _amid(branch: Branch) -> Iterator[PeriodicOrbit]:
+    """Motions of a closed branch away from its limit points: on all its sides at some frequencies between its ends."""
+    omega = branch.omega
+    low, high = float(omega.min()), float(omega.max())
+    for share in _CARRYING:
+        gap = omega - (low + share * (high - low))
+        for i in np.flatnonzero(np.signbit(gap[:-1]) != np.signbit(gap[1:])):
+            yield branch.orbits[int(i)]
+
+
 # ---------------------------------------------------------------------------------------------- ranges of existence
 class _Direction:
     """A detached branch over rising (`upper`) or falling values of the parameter."""
@@ -246,7 +382,7 @@ class _Direction:
     def settle(self, loop: Loop) -> None:
         """Go on from a branch within the range until it vanishes, meets another one, or the range ends."""
         ahead, since = loop, loop.value
-        while (step := next(self._relevant(ahead), None)) is not None:
+        while (step := next(self._relevant(ahead, since), None)) is not None:
             self.search.hold(self.isola, ahead, since, step[0])
             behind = self._behind(ahead, *step)
             if behind is None:
@@ -257,7 +393,10 @@ class _Direction:
 
     def _end(self, value: float, reason: str, event: TrackedEvent | None = None, centre: bool = False) -> None:
         """The range ends there: why, by which event, whether it shrinks to a point."""
-        isola, place = self.isola, None if event is None else IsolaEnd.of(event, self.name, centre)
+        self._ends(value, reason, None if event is None else IsolaEnd.of(event, self.name, centre))
+
+    def _ends(self, value: float, reason: str, place: IsolaEnd | None) -> None:
+        isola = self.isola
         (low, high), (first, last), (why, reasons) = isola.range, isola.ends, isola.reasons
         isola.range = (low, value) if self.upper else (value, high)
         isola.ends = (first, place) if self.upper else (place, last)
@@ -269,19 +408,35 @@ class _Direction:
         self.isola.pieces = tuple(dict.fromkeys([*self.isola.pieces, *loop.pieces]))
         return loop
 
+    def _open(self, value: float) -> None:
+        """It could not be followed further, for a reason that is none of the branch's."""
+        self.isola.notes += (
+            f"beyond {self.name} = {value:.6g} it could not be followed, and no event that was found ends it: more "
+            "harmonics or a smaller max_step may tell",
+        )
+        self._end(value, f"followed up to {self.name} = {value:.9g}, where its limit points were lost")
+
+    def _reach(self, loop: Loop, value: float) -> Loop | None:
+        """The branch at a value ahead: through a limit point that is known there, else from its motions."""
+        for piece in loop.pieces:
+            if piece.contains(value):
+                there = self.search.through(piece, value, noted=False)
+                if there is not None:
+                    return there
+        return self.search.carried(loop, value)
+
     def _cut(self, loop: Loop) -> None:
         """Behind the last event there is nothing but the bound."""
         name, bound = self.name, self.bound
-        last = [piece for piece in loop.pieces if piece.contains(bound)]
-        if not last:
-            reach = (max if self.upper else min)(p.high if self.upper else p.low for p in loop.pieces)
-            return self._end(reach, f"from {name} = {reach:.9g} on its limit points could not be followed")
-        at_bound = loop if loop.value == bound else self.search.through(last[0], bound)
+        at_bound = loop if loop.value == bound else self._reach(loop, bound)
         if at_bound is None:
-            return self._end(loop.value, f"behind {name} = {loop.value:.9g} it could not be followed")
+            return self._open(loop.value)
         if not at_bound.detached:
-            return self._bisect(last[0], loop, at_bound)
+            return self._bisect(loop, at_bound)
         if at_bound is not loop:
+            other = self.search.isola_of(at_bound, self.isola)
+            if other is not None:
+                return self._joined(other)
             self._take(at_bound)
         return self._end(bound, f"{name} = {bound:.9g}, the end of the bounds, cuts its range")
 
@@ -290,73 +445,97 @@ class _Direction:
         ends = {piece: piece.end(self.upper) for piece in loop.pieces}
         own = [e for e in events if any(end is e for end in ends.values())]
         met = own or events
-        lasting = [p for p, end in ends.items() if not any(end is e for e in own) and p.contains(value)]
-        if not lasting:
-            self._vanish(value, met)
+        # half way to what comes next, of any kind, or to the bound
+        ahead = next(self.search.critical(loop.branch.nu, value, self.upper), (self.bound, []))[0]
+        nearest = min if self.upper else max
+        behind = 0.5 * (value + nearest([ahead, *self._breaks(loop, value)]))
+        lasting = [piece for piece in loop.pieces if piece.contains(behind)]
+        centre = next((e for e in own if e.kind == "extremum" and e.isola != "isola_merging"), None)
+        if not lasting and centre is not None:
+            where = f"omega = {centre.omega:.9g}, {self.name} = {value:.9g}"
+            self._end(value, f"shrinks to a point (isola centre) at {where}", centre, True)
             return None
-        # half way to the next event of any kind, or to the bound
-        beyond, _ = next(self.search.critical(loop.pieces[0].nu, value, self.upper), (self.bound, []))
-        behind = 0.5 * (value + beyond)
-        after = self.search.through(lasting[0], behind)
+        after = self._reach(self._close_to(loop, value) if not lasting else loop, behind)
         if after is None:
-            self._end(value, f"at {self.name} = {value:.9g} it could not be followed further")
+            self._open(value)
             return None
         event = _reconnecting(met)
         if not after.detached:
-            if event is None or not (own or self._detached_before(value, lasting[0], loop)):
-                self._bisect(lasting[0], loop, after)
+            if event is None or not (own or self._detached_before(loop, value)):
+                self._bisect(loop, after)
                 return None
             self._end(value, _merging(self.name, value, event, after), event)
             return None
-        other = next((o for piece in after.pieces if (o := self.search.isola_on(piece, behind)) is not None), None)
+        other = self.search.isola_of(after, self.isola)
         if other is None:
             return self._take(after)
+        if value - _BEFORE * (value - loop.value) not in other:
+            # one that begins here is this one; two that were both there before have merged
+            self._joined(other)
+            return None
         place = ", ".join(
             f"{self.name} = {float(e):.7g}" for e in other.ends if e is not None and e.kind == "isola_centre"
         )
         which = f"the isola born at {place}" if place else "another isola"
-        where = f"omega = {met[0].omega:.9g}, {self.name} = {value:.9g}"
+        where = f"{f'omega = {met[0].omega:.9g}, ' if met else ''}{self.name} = {value:.9g}"
         self._end(value, f"merges at {where} with {which}, as which it goes on", event)
         return None
 
-    def _vanish(self, value: float, events: list[TrackedEvent]) -> None:
-        for event in events:
-            if event.kind == "extremum" and event.isola != "isola_merging":
-                where = f"omega = {event.omega:.9g}, {self.name} = {value:.9g}"
-                return self._end(value, f"shrinks to a point (isola centre) at {where}", event, True)
-        return self._end(value, f"its last limit points vanish in a {events[0].kind} at {self.name} = {value:.9g}")
+    def _joined(self, other: Isola) -> None:
+        """It goes on as an isola that is known already: the two are one."""
+        side = 1 if self.upper else 0
+        self.search.absorb(self.isola, other)
+        self._ends(other.range[side], other.reasons[side], other.ends[side])
 
-    def _detached_before(self, value: float, piece: MonotonePiece, loop: Loop) -> bool:
+    def _close_to(self, loop: Loop, value: float) -> Loop:
+        """The branch close before a value, where its motions lead farther; the loop itself where it is not found."""
+        before = self._reach(loop, value - _BEFORE * (value - loop.value))
+        return loop if before is None or not before.detached else self._take(before)
+
+    def _detached_before(self, loop: Loop, value: float) -> bool:
         """Whether a branch is detached until just before an event that is none of its own limit points."""
-        before = self.search.through(piece, value - _BEFORE * (value - loop.value))
+        before = self._reach(loop, value - _BEFORE * (value - loop.value))
         if before is None or not before.detached:
             return False
         self._take(before)
         return True
 
-    def _relevant(self, loop: Loop) -> Iterator[tuple[float, list[TrackedEvent]]]:
-        """Events ahead that may concern a branch: those of its own limit points, and those that reconnect others."""
-        for value, events in self.search.critical(loop.pieces[0].nu, loop.value, self.upper):
+    def _breaks(self, loop: Loop, since: float) -> Iterator[float]:
+        """Values ahead at which curves of limit points end though nothing was located there."""
+        sign, room = (1.0 if self.upper else -1.0), _TOGETHER * self.search.catalogue.span
+        for piece in loop.pieces:
+            reach = piece.high if self.upper else piece.low
+            if piece.end(self.upper) is None and sign * (self.bound - reach) > room < sign * (reach - since):
+                yield reach
+
+    def _relevant(self, loop: Loop, since: float) -> Iterator[tuple[float, list[TrackedEvent]]]:
+        """What ahead may concern a branch: events of its own limit points, those that reconnect others, and where its
+        limit points could not be followed further.
+        """
+        sign = 1.0 if self.upper else -1.0
+        begin = max(loop.value, since, key=lambda value: sign * value)
+        places: list[tuple[float, list[TrackedEvent]]] = [(reach, []) for reach in self._breaks(loop, begin)]
+        for value, events in self.search.critical(loop.branch.nu, begin, self.upper):
             own = any(piece.end(self.upper) is e for piece in loop.pieces for e in events)
             if own or any(e.isola == "isola_merging" or e.curve == "PD" for e in events):
-                yield value, events
+                places.append((value, events))
+        yield from sorted(places, key=lambda place: sign * place[0])
 
-    def _bisect(self, piece: MonotonePiece, inside: Loop, outside: Loop) -> None:
+    def _bisect(self, inside: Loop, outside: Loop) -> None:
         """Where a branch ceases to be detached though no event that is known explains it."""
-        a, b = inside.value, outside.value
+        a, b = inside, outside.value
         for _ in range(_BISECTIONS):
-            middle = self.search.through(piece, 0.5 * (a + b))
+            middle = self._reach(a, 0.5 * (a.value + b))
             if middle is None:
                 break
             if middle.detached:
-                self._take(middle)
-                a = middle.value
+                a = self._take(middle)
             else:
                 b = middle.value
-        low, high = sorted((a, b))
+        low, high = sorted((a.value, b))
         where = f"between {self.name} = {low:.6g} and {high:.6g}"
         self.isola.notes += (f"{where} it ceases to be detached, and no event that was found says why",)
-        self._end(a, f"detached up to {self.name} = {a:.6g} at least, no longer at {b:.6g}")
+        self._end(a.value, f"detached up to {self.name} = {a.value:.6g} at least, no longer at {b:.6g}")
 
 
 def _reconnecting(events: list[TrackedEvent]) -> TrackedEvent | None:
@@ -374,155 +553,3 @@ def _merging(name: str, value: float, event: TrackedEvent, after: Loop) -> str:
         return f"meets the motion whose period it doubles at {where}"
     what = f"the branch between {' and '.join(met)}" if met else "a branch that runs through the range"
     return f"merges at {where} with {what}"
-
-
-# ------------------------------------------------------------------------------------------------------------ the verb
-@with_options(SearchOptions)
-@timed
-def find_isolas(
-    system: System,
-    omega: tuple[float, float],
-    parameter: str,
-    bounds: tuple[float, float],
-    harmonics: Harmonics = "adaptive",
-    *,
-    values: int | Sequence[float] = 5,
-    depth: int = 1,
-    levels: Sequence[float] | None = None,
-    search: Sequence[int] | None = None,
-    seeds: Seeds | None = None,
-    max_curves: int = 64,
-    workers: int | None = 1,
-    **options: Unpack[SearchOptions],
-) -> Isolas:
-    """Isolated responses over a design parameter: where each is born, where it merges, the closed branch in between.
-
-    Parameters
-    ----------
-    system
-        What vibrates. The value that `parameter` has in it does not matter.
-    omega
-        Range of frequencies in which responses are followed, rad per unit time; the order is irrelevant.
-    parameter, bounds
-        The design parameter and its range; the order is irrelevant.
-    harmonics
-        As in `frequency_response`.
-    values
-        At how many values of the parameter, evenly spread over the bounds, responses are followed to begin with (at
-        least 2); or these values themselves.
-    depth
-        How many bifurcations deep branches are followed there: 0 the response alone, 1 with what leaves it (2T), 2 with
-        what leaves these (4T). Isolas of those periods are found.
-    levels
-        Other levels of the loads, in units of their own, at which responses are followed at these values as well: most
-        isolas join the main branch under stronger loads. Default: where no isola was found otherwise some between
-        1.5 and 5, at three of the values, until one is found; () for never.
-    search
-        Periods (2 for 2T, 3 for 3T, ...) of which isolas are looked for at these values among the nonlinear resonances
-        of the linear modes as well (`find_subharmonics`). Default: 2 where no isola was found otherwise, at three
-        of the values; () for never.
-    seeds
-        How finely that is done.
-    max_curves
-        Curves of bifurcations after which no more are followed.
-    workers
-        Processes (None: one for each core) among which the responses at the values, and at other levels of the loads,
-        are divided; curves over the parameter and closed branches, which start from each other, are followed in this
-        one. The result is the same bits.
-
-    Returns
-    -------
-    Isolas
-        A sequence of `Isola`, in the order of the values at which they are born; `notes` says what could not be
-        settled, `limit_points` and `doublings` are the curves that were followed. Ctrl-C ends it with what was found.
-
-    Notes
-    -----
-    An isola is met if one of its limit points, followed over the parameter, leads to a branch that bifurcates from the
-    response at one of `values`, or if the search meets it. One that does so nowhere within the bounds may be missed:
-    widen the bounds, or search for its period.
-    """
-    catalogue = Catalogue.checked(system, parameter, bounds, omega, harmonics, max_curves, options)
-    search_at = checked_values("values", values, catalogue.bounds, least=2)
-    if isinstance(search_at, int):
-        search_at = np.linspace(*catalogue.bounds, search_at).tolist()
-    check_count("depth", depth, 0)
-    processes = check_workers(workers)
-    other_levels, fine = checked_levels(levels), check_seeds(seeds)
-    orders = None if search is None else checked_orders(search, 2)
-    state = Search(catalogue, sorted(set(search_at)))
-    with catalogue.reporting(options.get("progress"), f"isolas over {parameter}"):
-        _from_responses(state, depth, processes)
-        _from_load_levels(state, other_levels, depth, processes)
-        _from_resonances(state, orders, fine)
-    return state.result()
-
-
-def checked_levels(levels: Any) -> tuple[float, ...] | None:
-    """Levels of the loads at which responses are followed besides; None where the search chooses."""
-    if levels is None:
-        return None
-    given = listed(levels)
-    if not all(is_number(level) and level > 0.0 for level in given):
-        raise InputError(f"levels must be positive numbers, those of the loads in units of their own, not {levels!r}")
-    if any(level == 1.0 for level in given):
-        raise InputError(
-            "levels are other ones than 1, that of the loads themselves: responses there are followed anyway"
-        )
-    return tuple(float(level) for level in given)
-
-
-#: levels of the loads, and periods of motions, that are tried where nothing else leads to an isola
-_LEVELS, _ORDERS = (1.5, 2.2, 3.2, 4.7), (2,)
-
-
-def _from_responses(search: Search, depth: int, workers: int) -> None:
-    """Responses at all values, with what bifurcates from them so many bifurcations deep."""
-    catalogue, count = search.catalogue, len(search.values)
-    catalogue.progress(0.0, f"{catalogue.name} = {search.values[0]:.6g}")
-    found = Responses(catalogue.emptied(), depth).over(list(search.values), workers, catalogue)
-    for number, (value, branches) in enumerate(zip(search.values, found, strict=True), 1):
-        for branch in followed_doublings(catalogue, value, branches):
-            search.attach(Loop(value, branch, search.pieces_on(branch, value), False))
-        if number < count:
-            catalogue.progress(_PREPARATION * number / count, f"{catalogue.name} = {search.values[number]:.6g}")
-    catalogue.progress(_PREPARATION, "closed branches")
-    search.settle(search.values)
-
-
-def _from_load_levels(search: Search, levels: Sequence[float] | None, depth: int, workers: int) -> None:
-    """Responses at other levels of all loads together, in units of their own: most isolas join the main branch there.
-
-    Limit points met there are followed over the level to the loads' own one, where they lie on branches of the system
-    itself. Without levels some, as long as no isola is known, and at few values.
-    """
-    catalogue = search.catalogue
-    for level in _LEVELS if levels is None else levels:
-        if levels is None and search.isolas:
-            break
-        values = search.few if levels is None else list(search.values)
-        found = UnderOtherLoads(catalogue.emptied(), depth, level).over(values, workers, catalogue)
-        for value, orbits in zip(values, found, strict=True):
-            catalogue.progress(_PREPARATION, f"{level:g} times the loads at {catalogue.name} = {value:.6g}")
-            known = list(search.met.get(value, []))
-            for orbit in orbits:
-                if any(lies_on(orbit, branch.points, images=True) for branch in known):
-                    continue
-                with catalogue.noting(f"at {catalogue.name} = {value:.6g}, a limit point from stronger loads"):
-                    bounds = (min(catalogue.omega.low, orbit.omega), max(catalogue.omega.high, orbit.omega))
-                    known.append(continue_branch(orbit, "omega", bounds, **catalogue.options))
-                    search.meet(known[-1], value)
-
-
-def _from_resonances(search: Search, orders: Sequence[int] | None, seeds: Seeds | None) -> None:
-    """Motions of some periods near nonlinear resonances of the linear modes (`find_subharmonics`).
-
-    Without periods those of 2T, where no isola is known, at few values.
-    """
-    if orders is None and search.isolas:
-        return
-    for value in search.few if orders is None else search.values:
-        for order in _ORDERS if orders is None else orders:
-            known = [branch for branch in search.met.get(value, []) if branch.nu == order]
-            for branch in search.catalogue.resonant(value, order, seeds, known, _PREPARATION):
-                search.meet(branch, value)

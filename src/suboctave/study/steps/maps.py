@@ -14,7 +14,7 @@ from suboctave.maps.catalogue import checked_orders, checked_values
 from suboctave.maps.isolas.map import IsolaMap, isola_map
 from suboctave.maps.isolas.margin import design_margin
 from suboctave.maps.isolas.result import Isolas
-from suboctave.maps.isolas.search import checked_levels, find_isolas
+from suboctave.maps.isolas.verb import checked_levels, find_isolas
 from suboctave.maps.regimes.map import RegimeMap
 from suboctave.maps.regimes.verb import regime_map
 from suboctave.store.table import Table
