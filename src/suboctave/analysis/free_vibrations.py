@@ -11,6 +11,7 @@ with the size, and the frequency with it.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -81,26 +82,23 @@ def linear_shapes(balance: HarmonicBalance) -> list[Array]:
 
 
 def _backbone(single: HarmonicBalance, shape: Array, sizes: Array, highest: float) -> Backbone:
-    """From the smallest size on, each from the one before."""
+    """From the smallest size on, each from the one before; where that fails from the shape of the linear mode."""
     frequencies = np.full(len(sizes), np.nan)
     motions = np.full((len(sizes), _HARMONICS + 1, single.size), np.nan)
-    last: tuple[Array, float, float] | None = None
+    before: tuple[float, Array, float] | None = None
     for i, size in enumerate(sizes):
-        try:
-            if last is None:
-                raise ConvergenceError("no free vibration is known")
-            motion, frequency = _free(single, shape, size, last[0] * (size / last[2]), last[1])
-        except ConvergenceError:
-            try:
-                # in the shape of the linear mode, about where it rests
-                alone = np.zeros((_HARMONICS + 1, single.size))
-                alone[1] = size * shape
-                motion, frequency = _free(single, shape, size, alone, _balancing(single, shape, alone, highest))
-            except ConvergenceError:
-                continue
-        frequencies[i], motions[i] = frequency, motion
-        last = motion, frequency, float(size)
-        if frequency > highest:
+        alone = np.zeros((_HARMONICS + 1, single.size))
+        alone[1] = size * shape
+        # where a law is not finite there is nothing
+        with suppress(ConvergenceError):
+            found = None if before is None else _free(single, shape, size, before[1] * (size / before[0]), before[2])
+            if found is None:
+                start = _balancing(single, shape, alone, highest)
+                found = None if start is None else _free(single, shape, size, alone, start)
+            if found is not None:
+                motions[i], frequencies[i] = found
+                before = float(size), *found
+        if frequencies[i] > highest:
             break
     return Backbone(frequencies, motions)
 
@@ -115,25 +113,22 @@ def _equations(single: HarmonicBalance, motion: Array, frequency: float) -> tupl
     rest[1:] += state.load[cosines[1:]]
     rows = (cosines[:, None] * single.size + np.arange(single.size)).ravel()
     by_frequency = np.einsum("hij,hj->hi", state.slope.real, motion)
-    values = rest.ravel(), state.jacobian[np.ix_(rows, rows)], by_frequency.ravel()
-    if not all(np.isfinite(part).all() for part in values):
-        raise ConvergenceError("a free vibration is not finite")
-    return values
+    return rest.ravel(), state.jacobian[np.ix_(rows, rows)], by_frequency.ravel()
 
 
-def _balancing(single: HarmonicBalance, shape: Array, motion: Array, start: float) -> float:
-    """The frequency at which the first harmonic balances along a shape; ConvergenceError where there is none."""
+def _balancing(single: HarmonicBalance, shape: Array, motion: Array, start: float) -> float | None:
+    """The frequency at which the first harmonic balances along a shape; None where nothing pulls the motion back."""
     rest, _, by_frequency = _equations(single, motion, start)
     own = slice(single.size, 2 * single.size)
     slope = float(shape @ by_frequency[own]) / (2.0 * start)  # by the square of the frequency
     square = start**2 - float(shape @ rest[own]) / slope if slope else -1.0
-    if not square > 0.0:
-        raise ConvergenceError("nothing pulls this motion back")
-    return float(np.sqrt(square))
+    return float(np.sqrt(square)) if square > 0.0 else None
 
 
-def _free(single: HarmonicBalance, shape: Array, size: float, motion: Array, frequency: float) -> tuple[Array, float]:
-    """The free vibration of a size near a guess, and its frequency (Newton); ConvergenceError where there is none."""
+def _free(
+    single: HarmonicBalance, shape: Array, size: float, motion: Array, frequency: float
+) -> tuple[Array, float] | None:
+    """The free vibration of a size near a guess, and its frequency (Newton); None where there is none."""
     n, count = single.size, motion.size
     matrix = np.zeros((count + 1, count + 1))
     along = shape / (shape @ shape)
@@ -143,11 +138,11 @@ def _free(single: HarmonicBalance, shape: Array, size: float, motion: Array, fre
         matrix[:count, :count], matrix[:count, count] = slope, by_frequency
         try:
             step = np.linalg.solve(matrix, np.append(rest, along @ motion[1] - size))
-        except np.linalg.LinAlgError as why:
-            raise ConvergenceError("free vibrations do not depend on their frequency here") from why
+        except np.linalg.LinAlgError:
+            return None
         motion, frequency = motion - step[:count].reshape(motion.shape), frequency - float(step[count])
-        if not (np.isfinite(frequency) and frequency > 0.0):
-            break
-        if length(step[:count]) <= _CLOSE * length(motion.ravel()) and abs(step[count]) <= _CLOSE * frequency:
+        if not (np.isfinite(motion).all() and np.isfinite(frequency) and frequency > 0.0):
+            return None
+        if length(step[:count]) <= _CLOSE * length(motion) and abs(step[count]) <= _CLOSE * frequency:
             return motion, frequency
-    raise ConvergenceError("no free vibration of this size was found")
+    return None

@@ -166,7 +166,7 @@ class MonotonePiece:
     def solve_at(self, value: float) -> Bifurcation:
         """The limit point at a value of `along`, located over omega; ConvergenceError where there is none on it."""
         if not self.contains(value):
-            raise ConvergenceError(f"this curve of limit points does not reach {self.along} = {value:.6g}")
+            raise ConvergenceError(f"the curve of limit points was not followed to {self.along} = {value:.6g}")
         if value not in self._located:
             with one_thread():
                 self._located[value] = self._solved(value)
