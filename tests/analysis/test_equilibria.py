@@ -231,3 +231,47 @@ def test_a_driven_motion_of_one_harmonic_is_no_equilibrium():
     # the scale of the displacement: F^2 alpha is the same all along
     assert np.ptp(limits.parameter("F") ** 2 * limits.parameter("alpha")) < 1e-9
     assert set(limits.omega) == {1.5}
+
+
+def pull_in(k=1.0):
+    """A plate on a spring before an electrode at a distance of one; at rest `V2 = 2 k x (1 - x)^2`."""
+    return so.System.from_equations("x'' + 0.05*x' + k*x = V2/(2*(1 - x)**2)", {"V2": 0.1, "k": k})
+
+
+def pull_in_called():
+    """The same, its force a function of which nothing is known."""
+    force = so.Callable(0, lambda x, v, V2: -V2 / (2.0 * (1.0 - x) ** 2), {"V2": "V2"})
+    return so.System(1.0, 0.05, 1.0, [force], parameters={"V2": 0.1})
+
+
+@pytest.mark.parametrize("system", [pull_in(), pull_in(3.0), pull_in_called()], ids=["text", "stiffer", "function"])
+def test_a_pole_of_a_force_ends_the_curve(system):
+    """Pull-in at x = 1/3, V2 = 8/27 k; the curve goes on towards the electrode, and no equilibrium lies behind it."""
+    k = system.parameters.get("k", 1.0)
+    curve = so.equilibria(system, "V2", (0.0, 0.4 * k))
+    (fold,) = curve.bifurcations
+    assert fold.kind == "LP"
+    assert fold.parameters["V2"] == pytest.approx(8.0 / 27.0 * k, rel=1e-9)
+    assert "is not finite" in curve.ended
+    x = curve.positions[:, 0]
+    assert x.max() < 1.0
+    np.testing.assert_allclose(curve.parameter("V2"), 2.0 * k * x * (1.0 - x) ** 2, atol=1e-9)
+
+
+def test_a_pole_that_changes_its_sign_ends_the_curve():
+    """`V = x (1 - x)` goes smoothly through the pole of `V / (1 - x)`."""
+    system = so.System.from_equations("x'' + 0.05*x' + x = V/(1 - x)", {"V": 0.1})
+    curve = so.equilibria(system, "V", (-1.0, 0.4))
+    assert "is not finite" in curve.ended
+    assert curve.positions.max() < 1.0
+    (fold,) = curve.bifurcations
+    assert fold.parameters["V"] == pytest.approx(0.25, rel=1e-9)
+
+
+def test_a_root_ends_the_curve_where_its_argument_vanishes():
+    """`x + sqrt(1 - x) = a` turns at x = 3/4 and ends at x = 1."""
+    system = so.System.from_equations("x'' + 0.05*x' + x + sqrt(1 - x) = a", {"a": 0.1})
+    curve = so.equilibria(system, "a", (1.0, 3.0))
+    assert "not finite" in curve.ended
+    assert curve.positions.max() == pytest.approx(1.0, abs=1e-6)
+    assert [item.kind for item in curve.bifurcations] == ["LP"]

@@ -100,6 +100,70 @@ def test_a_body_that_floats_is_named():
         so.frequency_response(system, (2.9, 3.0))
 
 
+def held_by_a_play(stiffness):
+    """Two masses; the second is held by a spring of this stiffness, and by a play in which a static load pushes it."""
+    return so.System(
+        np.diag([1.0, 0.4]),
+        [[0.06, -0.02], [-0.02, 0.05]],
+        np.diag([1.0, stiffness]),
+        elements=[so.Clearance((1, 0), stiffness=0.9, clearance=0.6, offset=0.05)],
+        loads=[so.HarmonicLoad(0, 0.25), so.StaticLoad(1, 0.02)],
+    )
+
+
+@pytest.mark.parametrize("range_", [(1.3, 1.8), (1.8, 1.3)])
+def test_a_body_held_by_a_play_alone_is_the_limit_of_a_soft_spring(range_):
+    """Scales do not rest on the response without elements, which a spring that vanishes makes infinite."""
+    none, soft, softer = (so.frequency_response(held_by_a_play(stiffness), range_) for stiffness in (0.0, 1e-6, 1e-9))
+    kinds = [item.kind for item in none.bifurcations]
+    assert len(kinds) >= 4
+    assert abs(none.omega[-1] - range_[1]) < 1e-12
+    for other in (soft, softer):
+        assert [item.kind for item in other.bifurcations] == kinds
+    gaps = [
+        np.abs(np.subtract([b.omega for b in none.bifurcations], [b.omega for b in other.bifurcations])).max()
+        for other in (soft, softer)
+    ]
+    assert gaps[0] < 1e-5
+    assert gaps[1] < 1e-7
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.05])
+def test_a_curve_ends_where_its_motion_begins_to_float(offset):
+    """`x'' + c x' = F cos(omega t)` within a play of half a width g: from `omega^4 + c^2 omega^2 = (F / g)^2` on the
+    motion touches neither side, and its mean is arbitrary. No motion leans on a side then.
+    """
+    c, load, half = 0.3, 0.5, 0.25
+    play = so.Clearance(0, stiffness=5.0, clearance=2.0 * half, offset=offset)
+    system = so.System(1.0, c, 0.0, elements=[play], loads=[so.HarmonicLoad(0, load)])
+    floats = np.sqrt(0.5 * (np.sqrt(c**4 + 4.0 * (load / half) ** 2) - c**2))
+    curve = so.frequency_response(system, (1.2, 2.0))
+    assert "whose mean position is arbitrary there" in curve.ended
+    assert curve.omega[-1] == pytest.approx(floats, rel=1e-4)
+    assert curve.amplitude.max() > half
+    extents = [np.ptp(orbit.displacement(np.linspace(0.0, 2.0 * np.pi / orbit.omega, 400))) for orbit in curve.orbits]
+    assert min(extents) > 2.0 * half - 1e-3
+    with pytest.raises(so.ConvergenceError, match="whose mean position is arbitrary there"):
+        so.frequency_response(system, (2.0, 1.2))
+
+
+def test_bodies_that_float_together_are_named():
+    """Two masses on a spring between stops: condensed, their stiffness is zero but for rounding."""
+    stiffness = np.array([[1.0, -1.0], [-1.0, 1.0]])
+    play = so.Clearance(0, stiffness=5.0, clearance=0.5)
+    system = so.System(np.diag([1.0, 0.5]), 0.1 * stiffness, stiffness, [play], [so.HarmonicLoad(1, 0.3)])
+    with pytest.raises(so.ConvergenceError, match="nothing holds DOF 0"):
+        so.frequency_response(system, (2.0, 1.9))
+
+
+def test_a_weak_spring_holds():
+    """A cubic spring alone, weak beside the masses: its mean stiffness, `3/2 a^2`, is 1e-5 of theirs."""
+    system = so.System(1.0, 0.1, 0.0, [so.CubicSpring(0, 1.0)], [so.HarmonicLoad(0, 0.01)])
+    curve = so.frequency_response(system, (2.0, 1.9))
+    assert len(curve) > 2
+    assert curve.stable.all()
+
+
 @pytest.fixture(scope="module")
 def bistable():
     """Both motions of a Duffing oscillator between its folds, by time integration from two states."""
@@ -136,6 +200,15 @@ def test_start_at_a_bifurcation():
     assert len(curve) > 10
     assert curve.omega[-1] in (fold.omega, 3.0)
     assert curve.omega.min() >= fold.omega
+
+
+def test_a_start_on_the_other_side_of_a_pole_is_asked_for():
+    """`x = 1/x + ..` at rest about 1; the linear response is about 0, where the force is not finite."""
+    system = so.System.from_equations("x'' + 0.1*x' + x = 1/x + F*cos(omega*t)", {"F": 0.01})
+    with pytest.raises(so.ConvergenceError, match=r"not finite .* Give start="):
+        so.continue_branch(system, "F", (0.01, 0.1), omega=1.2)
+    curve = so.frequency_response(system, (1.2, 1.25), start=[1.0, 0.0])
+    assert curve.orbits[0].displacement(0.0)[0] > 0.9
 
 
 def test_impossible_start_says_what_was_tried():

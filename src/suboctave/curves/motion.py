@@ -24,13 +24,13 @@ from suboctave.continuation.problem import Array, Curve, Evaluation
 from suboctave.curves.augmentation import PLAIN, Augmentation, Equations
 from suboctave.curves.floating import floating
 from suboctave.curves.still import beyond
-from suboctave.errors import ConvergenceError, NotFiniteError
+from suboctave.errors import ConvergenceError, InputError, NotFiniteError
 from suboctave.floquet.monodromy import floquet_multipliers
 from suboctave.floquet.result import FloquetResult
 from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.energy import fed
 from suboctave.harmonic.evaluation import BalanceState, HarmonicBalance
-from suboctave.harmonic.finite import unbounded_along, unbounded_between
+from suboctave.harmonic.finite import infinite_between, unbounded_along, unbounded_between
 from suboctave.harmonic.truncation import (
     AdaptiveHarmonics,
     beyond_usual,
@@ -283,7 +283,12 @@ class MotionProblem:
         if not omega > 0.0:
             raise ConvergenceError("omega is not positive")
         extra = self.extra(u)
-        return MotionEvaluation(self, fed(self.balance.at(x, omega, values), self.zeta(extra)), extra)
+        try:
+            state = self.balance.at(x, omega, values)
+        except InputError as failure:
+            # a coefficient has no value there
+            raise NotFiniteError(str(failure)) from None
+        return MotionEvaluation(self, fed(state, self.zeta(extra)), extra)
 
     def zeta(self, extra: Array) -> float:
         """See `Augmentation.zeta`."""
@@ -311,8 +316,11 @@ class MotionProblem:
 
     def severed(self, point: CurvePoint, u: Array, evaluation: Evaluation | None = None) -> str | None:
         """Where a force is not finite between a motion and u, or along that, in words; see `Curve`."""
-        if self.balance.settled:
-            return None
+        system, own = self.balance.system, {**self.balance.values, "omega": self.omega}
+        ends = ({**own, **self.named(at)} for at in (point.u, u))
+        infinite = infinite_between(system, self.names, *ends)
+        if infinite is not None or self.balance.settled:
+            return infinite
         assert isinstance(point.evaluation, MotionEvaluation)
         assert evaluation is None or isinstance(evaluation, MotionEvaluation)
         try:

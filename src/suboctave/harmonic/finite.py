@@ -1,17 +1,22 @@
-"""Whether a motion, or the way from one motion to another, crosses a place at which a force is not finite."""
+"""Whether a motion, or the way from one to another, crosses a place where a force or coefficient is not finite."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Mapping
+from functools import lru_cache
 
 import numpy as np
 
+from suboctave.errors import InputError
 from suboctave.harmonic.aft.general import GeneralLaw, force_of, not_finite
 from suboctave.harmonic.aft.law import Member
 from suboctave.harmonic.aft.poles import POINTS, unbounded
 from suboctave.harmonic.basis import Array
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.model.elements.smoothness import AdaptiveSampling, CornerSampling
+from suboctave.model.expressions.coefficients import Coefficient
+from suboctave.model.system import System
 
 
 def unbounded_along(state: BalanceState) -> str | None:
@@ -53,3 +58,35 @@ def _laws(state: BalanceState) -> Iterator[tuple[GeneralLaw, Member]]:
         for law, member in channel.members():
             if isinstance(law, GeneralLaw) and isinstance(member.kind, AdaptiveSampling | CornerSampling):
                 yield law, member
+
+
+@lru_cache(maxsize=32)
+def _quotients(system: System, names: tuple[str, ...]) -> list[tuple[str, Coefficient]]:
+    """The coefficients of a system that depend on some parameters and may be infinite, with where they stand."""
+    return [(where, c) for where, c, _ in system.expressions() if c.names.intersection(names) and c.may_be_infinite]
+
+
+def infinite_between(
+    system: System, names: tuple[str, ...], first: Mapping[str, float], last: Mapping[str, float]
+) -> str | None:
+    """Which coefficient is not finite between two values of some parameters, in words; None if all are finite."""
+    for where, source in _quotients(system, names):
+
+        def values(shares: Array, source: Coefficient = source) -> Array:
+            return np.array([_value(source, first, last, names, share) for share in shares.tolist()])
+
+        share = unbounded(values, np.linspace(0.0, 1.0, POINTS))
+        if share is not None:
+            at = ", ".join(f"{n} = {first[n] + share * (last[n] - first[n]):.6g}" for n in names if n in source.names)
+            return f"{where}, {source}, is not finite (at {at})"
+    return None
+
+
+def _value(
+    source: Coefficient, first: Mapping[str, float], last: Mapping[str, float], names: tuple[str, ...], share: float
+) -> float:
+    at = {**first, **{name: first[name] + share * (last[name] - first[name]) for name in names}}
+    try:
+        return source.value(at)
+    except InputError:
+        return math.nan

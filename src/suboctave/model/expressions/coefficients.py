@@ -12,7 +12,7 @@ from typing import Annotated, Any, TypeAlias
 
 from suboctave.arguments import READ
 from suboctave.errors import InputError, is_number, located, shortened, suggest
-from suboctave.model.expressions.reader import FUNCTIONS, Form, number_form, read
+from suboctave.model.expressions.reader import FUNCTIONS, Form, may_be_infinite, number_form, read
 
 
 class Coefficient:
@@ -45,6 +45,11 @@ class Coefficient:
             pass
         at = ", ".join(f"{name} = {values[name]:g}" for name in sorted(self.names))
         raise InputError(f"{self} is not a finite real number" + (f" at {at}" if at else ""))
+
+    @property
+    def may_be_infinite(self) -> bool:
+        """Whether it divides by what depends on a parameter, or has a function that is not finite everywhere."""
+        return may_be_infinite(self._form)
 
     def derivative(self, name: str) -> Coefficient:
         """The exact derivative by a parameter (or "omega"); the constant 0 where the name does not occur."""

@@ -79,6 +79,25 @@ def number_form(value: float, operation: str = "number", parts: tuple[Any, ...] 
     return Form(operation, parts or (value,), lambda _: value, affine={}, constant=value)
 
 
+#: functions that are infinite, or no number, somewhere on the real axis or beyond a place of it
+_BOUNDED_DOMAIN = frozenset({"sqrt", "log", "tan", "asin", "acos"})
+
+
+def may_be_infinite(form: Form) -> bool:
+    """Whether a form divides by what depends on a name, has a power that may do so, or such a function, of a name."""
+    if not form.names:
+        return False
+    if form.operation == "expression" or form.operation in _BOUNDED_DOMAIN:
+        return True
+    if form.operation == "/" and form.parts[1].names:
+        return True
+    if form.operation == "**":
+        power = form.parts[1].constant
+        if power is None or power < 0.0 or not float(power).is_integer():
+            return True
+    return any(may_be_infinite(part) for part in form.parts if isinstance(part, Form))
+
+
 def read(
     text: str, where: str, functions: Mapping[str, Callable[..., float]], refusal: Callable[[str], str | None]
 ) -> Form:
