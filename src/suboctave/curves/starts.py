@@ -238,15 +238,16 @@ def start_point(
             reason = str(failure)
             if reason not in tried:
                 tried += [name, reason]
-    what = f"no motion found to start from at {curve.where(linear)}"
+    where = curve.where(linear)
     if isinstance(loose, Floating):
-        raise ConvergenceError(f"{what}: {loose}, or start elsewhere in the range")
+        raise ConvergenceError(f"no motion found to start from at {where}: {loose}, or start elsewhere in the range")
     if wall is not None:
         raise NotFiniteError(
-            f"{what}: on the way {wall}. Give start= (an orbit, or a state), on the side of that place that is meant"
+            f"no motion found to start from at {where}: on the way {wall}. Give start= (an orbit, or a state), on the "
+            "side of that place that is meant"
         )
     raise ConvergenceError(
-        f"{what}{loose or ''}. Tried: " + "; ".join(tried) + ". "
+        f"no motion found to start from at {where}{loose or ''}. Tried: " + "; ".join(tried) + ". "
         "Start elsewhere in the range, or give start= (an orbit, or a state near the motion)"
     )
 
