@@ -578,7 +578,7 @@ def _read(made: Any, groups: Datasets, allow_code: bool, linear: Any) -> TimeRes
         name = place.name or field
         if isinstance(place, StatesOn):
             given[field] = np.concatenate([stored["displacement"], stored["velocity"]], axis=-1)
-        elif place.axes and name not in stored.dataset:
+        elif place.axes and type(None) in get_args(kind) and name not in stored.dataset:
             continue  # one that has a default, which most results do without
         elif place.axes:
             given[field] = stored[name] if stored[name].dtype.kind not in "OU" else tuple(map(str, stored[name]))

@@ -15,7 +15,7 @@ import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,9 +25,6 @@ from suboctave.model.elements.base import Array, numbers_of
 from suboctave.model.elements.coupled import as_coupled, reads
 from suboctave.model.elements.smoothness import levels
 from suboctave.model.expressions.coefficients import coefficient
-
-if TYPE_CHECKING:
-    from suboctave.model.system import System
 
 #: states at which forces are compared with those a turn further; decades of displacements in turns, and of velocities
 _STATES, _TURNS, _DECADES = 256, 3.0, 3.0
@@ -58,7 +55,8 @@ class Turns:
 
     def __init__(self, rows: Any) -> None:
         self.rows: Array = np.asarray(rows, dtype=float)
-        self.inverse: Array = np.linalg.pinv(self.rows) if len(self.rows) else self.rows.T
+        inverse: Any = np.linalg.pinv(self.rows) if len(self.rows) else self.rows.T
+        self.inverse: Array = inverse
         #: by how much each coordinate grows in a turn, infinite of those that are no angles, (n,)
         grown = np.abs(self.rows).max(axis=0, initial=0.0)
         self.periods: Array = np.where(grown > _ROUNDING * grown.max(initial=0.0), grown, np.inf)
@@ -149,13 +147,13 @@ def declared_angles(texts: Sequence[str]) -> tuple[list[str], dict[str, str]]:
     return equations, declared
 
 
-def check_angles(system: System) -> None:
+def check_angles(system: Any) -> None:
     """Refuse an angle a turn of which changes a force, at the system's parameters."""
     for angle in system.angles:
         _check(system, angle)
 
 
-def _check(system: System, angle: Angle) -> None:
+def _check(system: Any, angle: Angle) -> None:
     n, values, turn = system.n, system.parameters, angle.turn(system.n)
     parts: list[tuple[str, Array, Array]] = []  # what acts, its forces (n, N) at states, and those a turn further
     for what in ("stiffness", "structural"):
@@ -176,7 +174,8 @@ def _check(system: System, angle: Angle) -> None:
             c = element.coefficient_values(values)
             with np.errstate(all="ignore"):
                 both = [np.asarray(law.tangent(at, theta, c)[0], dtype=float) for at in (q, q + further)]
-            parts.append((element.label, *(np.outer(acting, np.broadcast_to(force, theta.shape)) for force in both)))
+            here, there = (np.outer(acting, np.broadcast_to(force, theta.shape)) for force in both)
+            parts.append((element.label, here, there))
     known = np.ones(1, dtype=bool)
     for _, here, there in parts:
         known = known & np.isfinite(here).all(axis=0) & np.isfinite(there).all(axis=0)
@@ -199,7 +198,7 @@ def _of(known: NDArray[np.bool_], forces: Array) -> Any:
     return known if forces.shape[1] == len(known) else slice(None)
 
 
-def _states(system: System, elements: Sequence[Any], angle: Angle) -> Array:
+def _states(system: Any, elements: Sequence[Any], angle: Angle) -> Array:
     """States (2n, N) of all sizes, and beside the corners of laws; of the degrees of freedom that elements read."""
     n, random, size = system.n, np.random.default_rng(0), min(map(abs, angle.periods))
     read = np.flatnonzero(np.any(np.vstack([np.asarray(e.inputs(n)) for e in elements]), axis=0))

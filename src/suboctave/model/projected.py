@@ -76,7 +76,7 @@ class ProjectedSystem(System):
         rows = []
         for angle in self.structure.angles:
             turn = angle.turn(self.structure.n)
-            row: Array = np.linalg.lstsq(self.shapes, turn, rcond=None)[0]
+            row = np.asarray(np.linalg.lstsq(self.shapes, turn, rcond=None)[0], dtype=float)
             if np.abs(self.shapes @ row - turn).max() > _TURNED * np.abs(turn).max():
                 raise InputError(
                     f"a turn of {angle.name(self.structure.dof_names)} is no motion of the projected structure: give "

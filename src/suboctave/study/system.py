@@ -59,12 +59,11 @@ def published() -> dict[str, Any]:
 
 def make_system(section: SystemSection, folder: Path, mistakes: Mistakes, allow_code: bool) -> System | None:
     """The system, or None where something is wrong with it."""
-    system = _made(section, folder, mistakes, allow_code)
-    if system is None or section.angles is None:
-        return system
-    with mistakes.at("system"):
-        return system.with_angles(section.angles)
-    return None
+    system, before = _made(section, folder, mistakes, allow_code), len(mistakes)
+    if system is not None and section.angles is not None:
+        with mistakes.at("system"):
+            system = system.with_angles(section.angles)
+    return system if len(mistakes) == before else None
 
 
 def _made(section: SystemSection, folder: Path, mistakes: Mistakes, allow_code: bool) -> System | None:
