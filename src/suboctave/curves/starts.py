@@ -41,7 +41,6 @@ from suboctave.harmonic.linear_part import LinearPart
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.truncation import AdaptiveHarmonics
 from suboctave.lazy import lazy
-from suboctave.model.angles import Turns
 from suboctave.model.system import System
 from suboctave.timedomain import Trajectory, integrate
 
@@ -384,14 +383,15 @@ _CLOSES = 1e-3
 
 def _check_no_rotation(system: System, trajectory: Trajectory) -> None:
     """Refuse a motion that comes back after a period but for whole turns, of 2 pi where no angle is declared."""
-    turns = system.turns or Turns(2.0 * math.pi * np.eye(system.n))
-    away = trajectory.x[-1] - trajectory.x[0]
-    counts = turns.counts(away)
-    turned = np.flatnonzero(counts)
-    speeds = np.abs(trajectory.v[-1] - trajectory.v[0]) / np.maximum(np.abs(trajectory.v).max(axis=0), 1e-300)
-    finite = np.where(np.isfinite(turns.periods), turns.periods, np.maximum(np.abs(trajectory.x).max(axis=0), 1e-300))
-    if turned.size and max(speeds.max(), (np.abs(turns.modulo(away)) / finite).max()) <= _CLOSES:
-        dof = int(np.argmax(np.abs(counts @ turns.rows)))
+    turns, away = system.turns, trajectory.x[-1] - trajectory.x[0]
+    rest = turns.modulo(away) if turns else away - 2.0 * math.pi * np.rint(away / (2.0 * math.pi))
+    turned = np.abs(away - rest)
+    if not turned.max() > 0.0:
+        return
+    largest = np.abs(trajectory.v).max(axis=0)
+    speeds = np.abs(trajectory.v[-1] - trajectory.v[0]) / np.maximum(largest, max(_CLOSES * largest.max(), 1e-300))
+    if max(speeds.max(), np.abs(rest).max() / turned.max()) <= _CLOSES:
+        dof = int(np.argmax(turned))
         name = system.dof_names[dof] if system.dof_names else f"x_{dof}"
         raise ConvergenceError(
             f"the motion from this state turns: {name} grows by {away[dof]:.6g} in its period. Harmonic balance "

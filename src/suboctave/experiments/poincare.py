@@ -253,6 +253,8 @@ class Attractor:
     drift
         Of a drifting motion the periods of the load after which it repeats, and by how much its displacements (n,) have
         grown by then; else None.
+    names
+        Of the degrees of freedom, if they have any.
     """
 
     kind: str
