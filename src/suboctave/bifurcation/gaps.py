@@ -113,7 +113,7 @@ def level_rate(state: BalanceState, element: int, index: int, name: str) -> floa
     if isinstance(kind, PiecewiseLinear):
         return float(rates[kind.pieces[index].gap])
     by_coefficient = local.element.level_rates(local.coefficients)
-    return float(by_coefficient[index] @ rates) if index < len(by_coefficient) else 0.0
+    return float(np.nan_to_num(by_coefficient[index][0]) @ rates) if index < len(by_coefficient) else 0.0
 
 
 class Height(NamedTuple):

@@ -106,6 +106,7 @@ class Cornered(Protocol):
     def surface(self, which: int, q: Array, theta: Array) -> Surface: ...
     def surface_slopes(self, which: int, q: Array, theta: Array) -> tuple[Array, Array, Array]: ...
     def tangent(self, q: Array, theta: Array) -> tuple[Array, Array]: ...
+    def by_state_and_coefficients(self, q: Array, theta: Array) -> Array: ...
     def curvature(self, q: Array, theta: Array) -> Array: ...
     def third_derivative(self, q: Array, theta: Array) -> Array: ...
 
@@ -202,13 +203,34 @@ def surface_at(law: Cornered, corner: Corner, q: Array, theta: Array) -> Surface
     return Surface(q[corner.row] - corner.level, normal, bend, by_phase, np.zeros((rows, count)), by_coefficients)
 
 
-def by_coefficients(law: Cornered, comb: Comb) -> Array:
-    """phi_c at a corner, (nc, N)."""
+def by_coefficients(law: Cornered, comb: Comb) -> list[tuple[Comb, Array]]:
+    """phi_c at a corner, (nc, N), with the Dirac functions that it counts for: where several corners fall together, of
+    each of them.
+
+    They are told apart by how they move: as f is continuous, `[f_c] = sum_i eta_i phi_ic` beside `[f_a] = sum_i eta_i
+    n_a`.
+    """
     if comb.corner.row >= len(comb.surface.normal):
-        return comb.surface.by_coefficients
-    rates = law.element.level_rates(law.c)[comb.corner.number]
-    result: Array = np.multiply.outer(-rates, np.ones(len(comb.zr)))
-    return result
+        return [(comb, comb.surface.by_coefficients)]
+    moving = -law.element.level_rates(law.c)[comb.corner.number]
+    spread = [np.multiply.outer(one, np.ones(len(comb.zr))) for one in moving]
+    unknown = np.isnan(moving[0])
+    if len(moving) == 1 and not unknown.any():
+        return [(comb, spread[0])]
+    q, theta = law.state_at(comb.zr, comb.zi)
+    above, below, _ = beside(law, comb.corner, q, theta, BESIDE)
+    jumps = law.by_state_and_coefficients(above, theta) - law.by_state_and_coefficients(below, theta)
+    eta, by = jumps[comb.corner.row], jumps[len(q) :]
+    if len(moving) == 1:  # of all together: right in all that is linear in it
+        spread[0][unknown] = np.where(eta == 0.0, 0.0, by / np.where(eta == 0.0, 1.0, eta))[unknown]
+        return [(comb, spread[0])]
+    equations, known = np.concatenate((np.ones((1, len(moving))), moving.T)), np.concatenate((eta[None], by))
+    # coefficients have units
+    size = np.abs(equations).max(axis=1, keepdims=True)
+    size[size == 0.0] = 1.0
+    parts = np.linalg.lstsq(equations / size, known / size, rcond=None)[0]
+    rates = np.maximum(np.abs(comb.corner.rate), 1e-12 * comb.corner.size)
+    return [(comb._replace(weights=part / rates), one) for part, one in zip(parts, spread, strict=True)]
 
 
 def combs(law: Cornered) -> list[Comb]:

@@ -195,8 +195,8 @@ class GeneralLaw(LawAlong):
         f_c, f_qc = law.coefficient_tangent(*self.path, member.coefficients)
         f_cc = law.coefficient_curvature(*self.path, member.coefficients)
         derivatives = CoefficientSpectra(self.project(f_c), self.project(f_qc), self.project(f_cc))
-        for comb in self._combs:
-            by, normal = by_coefficients(self, comb), comb.surface.normal
+        for comb, by in self._moving_combs:
+            normal = comb.surface.normal
             derivatives.tangent[:, : len(normal)] += self._at_corner(comb, np.einsum("cn,rn->crn", by, normal))
             derivatives.curvature[:] += self._at_corner(comb, np.einsum("cn,dn->cdn", by, by))
         return derivatives
@@ -214,8 +214,8 @@ class GeneralLaw(LawAlong):
             total[0] += rate @ f_c
             total[1:] += (rate @ f_qc.reshape(len(rate), -1)).reshape(q.shape)
         out[: len(total)] += self.project(total)
-        for comb in self._combs:
-            moved = rates[self.members[0].number] @ by_coefficients(self, comb)
+        for comb, by in self._moving_combs:
+            moved = rates[self.members[0].number] @ by
             out[1 : 1 + len(q)] += self._at_corner(comb, moved * comb.surface.normal)
 
     def _at_corner(self, comb: Comb, values: Array) -> ComplexArray:
@@ -227,6 +227,16 @@ class GeneralLaw(LawAlong):
     @lazy
     def _combs(self) -> list[Comb]:
         return combs(self)
+
+    @lazy
+    def _moving_combs(self) -> list[tuple[Comb, Array]]:
+        """Those with phi_c."""
+        return [part for comb in self._combs for part in by_coefficients(self, comb)]
+
+    def by_state_and_coefficients(self, q: Array, theta: Array) -> Array:
+        """`f_q` and `f_c` of the one law with corners, (Q + nc, N)."""
+        law = as_coupled(self.element)
+        return np.concatenate((law.tangent(q, theta, self.c)[1], law.coefficient_tangent(q, theta, self.c)[0]))
 
     @property
     def rough(self) -> bool:

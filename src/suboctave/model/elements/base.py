@@ -194,24 +194,30 @@ class BaseElement(Recorded, ABC, family="element"):
                     result[i] += slope.derivative(second).value(values) * a[first] * b[second]
         return result
 
-    def level_rates(self, c: Array) -> Array:
-        """Derivatives of the levels at which the law has corners or is sharp by its coefficients, (levels, nc).
+    def level_rates(self, c: Array) -> list[Array]:
+        """Derivatives by the coefficients of the levels at which the law has corners or is sharp: of each level, points
+        before velocities, those of all corners that fall together there, (corners, nc).
 
-        Points before velocities. What `sampling` says are the levels alone, hence differences of fourth order in steps
-        of 1e-3 of a coefficient: exact for levels that are polynomials of it, to about 1e-12 else. Zero where the
-        number of levels changes.
+        What `sampling` says are the levels alone, hence differences of fourth order in steps of 1e-3 of a coefficient,
+        shorter ones where the levels do not keep apart, nan where they never do: exact for levels that are polynomials
+        of it, to about 1e-12 else. A law that knows its places has them exactly.
         """
 
         def levels(at: Array) -> Array:
             kind = self.sampling(at)
             return np.array([*getattr(kind, "points", ()), *getattr(kind, "velocities", ())])
 
-        rates = np.zeros((len(levels(c)), len(c)))
+        here = levels(c)
+        rates = np.full((len(here), len(c)), np.nan)
         for i, value in enumerate(c):
             h = 1e-3 * (abs(float(value)) or 1.0)
-            if all(len(levels(shifted(c, i, share * h))) == len(rates) for share in (1.0, -1.0, 2.0, -2.0)):
-                rates[:, i] = shift_derivative(levels, c, i, h)
-        return rates
+            for _ in range(_SHORTENED):
+                moved = [levels(shifted(c, i, share * h)) for share in (1.0, -1.0, 2.0, -2.0)]
+                if all(len(one) == len(here) for one in moved) and _keep_apart(here, moved):
+                    rates[:, i] = (8.0 * (moved[0] - moved[1]) - (moved[2] - moved[3])) / (12.0 * h)
+                    break
+                h *= 0.1
+        return list(rates[:, None])
 
     def check(self, values: Mapping[str, float], first: bool) -> None:
         """Refuse coefficients that make no sense at a system's parameters.
@@ -290,6 +296,14 @@ class DeclaredElement(Element):
         return self.law_at(c).third(u, c), None, None, None
 
 
+def _keep_apart(levels: Array, moved: Sequence[Array]) -> bool:
+    """Whether levels have moved by less than half their distances, so that none has passed another."""
+    if len(levels) < 2:
+        return True
+    room = 0.5 * np.abs(np.subtract.outer(levels, levels) + np.diag(np.full(len(levels), np.inf))).min()
+    return all(float(np.abs(one - levels).max()) < room for one in moved)
+
+
 def required(owner: str, **given: Any) -> None:
     """Refuse arguments that were left out (they follow the optional `dof`, so Python cannot)."""
     missing = [name for name, value in given.items() if value is None]
@@ -297,6 +311,8 @@ def required(owner: str, **given: Any) -> None:
         raise InputError(f"{owner} needs {' and '.join(missing)}")
 
 
+#: how often a step of 1e-3 is made ten times shorter before levels are taken to fall together
+_SHORTENED = 6
 #: step as a share of the length over which a law changes: truncation (step^4 / 30 times a fifth derivative) and
 #: rounding (1e-16 / step, more behind a sharp corner) both stay below 1e-7 there
 STEP = 2e-3

@@ -252,6 +252,10 @@ class Expression(CoupledElement):
     coefficient_tangent = _of_law("coefficient_tangent")
     coefficient_curvature = _of_law("coefficient_curvature")
 
+    def level_rates(self, c: Array) -> list[Array]:
+        exact = self._law.level_rates(c)
+        return super().level_rates(c) if exact is None else exact
+
     def surface(self, which: int, q: Array, theta: Array, c: Array) -> Surface:
         return self._law.surface(which, q, theta, c)
 

@@ -49,6 +49,8 @@ _HIGHEST_DEGREE = 30
 #: distance from the real axis at which functions of a real argument have their nearest singularity
 _SINGULAR = {sympy.tanh: sympy.pi / 2, sympy.atan: 1}
 _OPERATIONS = 5000
+#: distance of two corners, relative to their places, that is rounding of these: 0.1 + 0.2 and 0.3
+_TOGETHER = 1e-14
 
 
 @functools.lru_cache(maxsize=512)
@@ -219,9 +221,29 @@ class Law:
             return AdaptiveSampling()
         rows, places = zip(*self._corner_places, strict=True)
         values = self._numbers("corners", places, c)
-        points = {value for row, value in zip(rows, values, strict=True) if row == 0}
-        velocities = {value for row, value in zip(rows, values, strict=True) if row}
-        return CornerSampling(tuple(sorted(points)), tuple(sorted(velocities)), self.rough)
+        points, velocities = (
+            [v for r, v in zip(rows, values, strict=True) if bool(r) is moving] for moving in (False, True)
+        )
+        return CornerSampling(_apart(points), _apart(velocities), self.rough)
+
+    def level_rates(self, c: Array) -> list[Array] | None:
+        """See `BaseElement.level_rates`: from the derivatives of the places; None where they are no places."""
+        if not self._corner_places or self._degree is not None:
+            return None
+        rows, places = zip(*self._corner_places, strict=True)
+        values = self._numbers("corners", places, c)
+        parts = [place.diff(one) for place in places for one in self.c]
+        rates = np.reshape(self._numbers("rates of corners", parts, c), (len(places), len(self.c)))
+        kind = self.sampling(c)
+        assert isinstance(kind, CornerSampling)
+        found = []
+        for moving, levels in ((False, kind.points), (True, kind.velocities)):
+            own = [i for i, row in enumerate(rows) if bool(row) is moving]
+            nearest = [int(np.argmin([abs(values[i] - level) for level in levels])) for i in own]
+            found += [
+                rates[[i for i, n in zip(own, nearest, strict=True) if n == number]] for number in range(len(levels))
+            ]
+        return found
 
     def _numbers(self, what: str, parts: Sequence[Any], c: Array) -> list[float]:
         """Values of expressions of the coefficients."""
@@ -361,6 +383,15 @@ def _with_phase(expression: Any, where: str) -> tuple[Any, int]:
         what = "time" if t in expression.free_symbols else "omega"
         raise InputError(f"{where}: {what} occurs outside of cos(k*omega*t + phase) and sin(k*omega*t + phase)")
     return expression, highest
+
+
+def _apart(places: Sequence[float]) -> tuple[float, ...]:
+    """Places in ascending order, those that fall together taken once."""
+    found: list[float] = []
+    for place in sorted(places):
+        if not found or place - found[-1] > _TOGETHER * max(abs(place), abs(found[-1])):
+            found.append(place)
+    return tuple(found)
 
 
 def harmonic_of(argument: Any) -> int | None:
