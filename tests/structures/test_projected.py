@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+
 import numpy as np
 import pytest
 import scipy.sparse
@@ -154,6 +156,37 @@ def test_along_a_curve_a_basis_grows_ahead(what, ratio):
     assert len(used) <= 5
     sizes = [one.projected.shapes.shape[1] for one in (linear.reduction, used[-1])]
     assert sizes[1] < 1.5 * sizes[0]
+
+
+@pytest.mark.parametrize("what", ["frequency", "parameter", "both"])
+def test_a_basis_does_not_depend_on_what_else_is_alive(what):
+    """What a curve asks for first, and what others have asked for, leaves it as it is, bit for bit."""
+    system = chain(80, [so.CubicSpring(79, 0.5)], [so.HarmonicLoad(79, 0.1)], k=0.5)
+    values = {"k": 0.5 if what == "frequency" else 0.83}
+    times = 1.0 if what == "parameter" else 1.3
+
+    def asked():
+        linear = so.condense(system, 0.3)
+        return linear.rebuilt(values).covering(times * linear.covers)
+
+    def bits(part):
+        return part.stiffness(np.linspace(0.1, 4.0, 9)).tobytes()
+
+    alone = bits(asked())
+    gc.collect()
+    others = [so.condense(system, 0.3) for _ in range(3)]
+    kept = [
+        others[0].covering(3.0 * others[0].covers),
+        others[1].rebuilt({"k": 0.9}).covering(2.0 * others[1].covers),
+        *(others[2].rebuilt({"k": k}) for k in (0.45, 0.6, 0.75, 1.2, 3.0)),
+    ]
+    assert bits(asked()) == alone
+    # and along a curve that comes from elsewhere
+    linear = others[2]
+    for k in (3.0, 0.6, values["k"]):
+        last = linear.rebuilt({"k": k})
+    assert bits(last.covering(times * linear.covers)) == alone
+    assert len(kept) == 7
 
 
 def test_where_an_expression_is_none_no_basis_grows_ahead():

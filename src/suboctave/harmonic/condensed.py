@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -141,12 +141,20 @@ class Condensed:
                 f"a frequency of {frequency:.3g} is far beyond {self.covers:.3g}, which the structure is projected for"
             )
         if self._wider is None or self._wider.covers < frequency:
-            # in steps that are the same for all motions
-            wide = self.covers
-            while wide < frequency:
-                wide *= _BEYOND
-            self._wider = Condensed(self.reduction.covering(wide, self.values), self.values, self.held)
+            wider = self.reduction.covering(self._wide(frequency), self.values)
+            self._wider = Condensed(wider, self.values, self.held)
         return self._wider
+
+    def serving(self, frequency: float, several: Iterable[Mapping[str, float]]) -> Condensed:
+        """One that serves up to a frequency at all of some values of the parameters, at the values of this part."""
+        return Condensed(self.reduction.serving(self._wide(frequency), several), self.values, self.held)
+
+    def _wide(self, frequency: float) -> float:
+        """The frequency to cover, in steps that are the same for all motions."""
+        wide = self.covers
+        while wide < frequency:
+            wide *= _BEYOND
+        return wide
 
     # -------------------------------------------------------------------------------------------------- coordinates
     @lazy

@@ -14,7 +14,8 @@ is `R^T Z^-1 R`, of second order in the residual where the matrices are symmetri
 M)^-1 R`.
 
 A basis that serves at two values of the parameters that are not far apart serves between them: the error vanishes at
-both. So where a curve leaves the values that are known, a basis grows at one ahead of it.
+both. So the values are divided into cells, and in each a basis serves that was grown at both ends of it. Which basis
+that is depends on the first one, on the cell and on the frequency alone, not on what else was asked for.
 """
 
 from __future__ import annotations
@@ -22,8 +23,7 @@ from __future__ import annotations
 import copy
 import math
 import weakref
-from collections.abc import Callable, Mapping
-from functools import partial
+from collections.abc import Callable, Iterable, Mapping
 from itertools import combinations_with_replacement
 from typing import Any, NamedTuple
 
@@ -58,8 +58,8 @@ _WRONG = 1e-3
 _MOST, _ROOM = 600, 40
 #: distance of two values of every expression in a matrix, relative, up to which what serves at both serves between
 _NEAR = 1.0 / 3.0
-#: how many times farther than the value asked for a basis may grow, and the ratio of the ways tried
-_AHEAD, _STEP = 100.0, 1.5
+#: how often a cell of parameters is halved until the expressions at its ends are so near
+_HALVINGS = 8
 
 
 class Projected(NamedTuple):
@@ -97,8 +97,8 @@ class Reduction:
     those of other loads, (l, n); larger ones grow from it.
 
     served: these and others that the motion is read along, (k, n), such as those of the degrees of freedom `observed`;
-    scale: a frequency within the range of interest; projected: the structure in the basis. Made by `of` and `covering`:
-    what one curve asks for does not change what others have, and what several ask for is made once.
+    scale: a frequency within the range of interest; projected: the structure in the basis. Immutable; made by `of` and
+    `covering`: what several ask for is made once, and is what each would have made.
     """
 
     def __init__(
@@ -116,7 +116,9 @@ class Reduction:
         self._solve: Any = None
         #: where the basis was tested
         self._tested: list[_Tested] = []
-        #: all that have grown from one and are in use, by what they were grown for
+        #: what this one has grown from, None for a first one; those that have grown from a first one and are in use, by
+        #: what they were grown for
+        self._first: Reduction | None = None
         self._larger: weakref.WeakValueDictionary[tuple[Any, ...], Reduction] = weakref.WeakValueDictionary()
 
     @classmethod
@@ -145,24 +147,41 @@ class Reduction:
 
     def covering(self, frequency: float, values: Mapping[str, float]) -> Reduction:
         """This one, or one that serves up to a frequency at these values of the parameters."""
+        if self.system.n <= COMPLETE or self._serves(frequency, self._expressions(values)):
+            return self
+        first = self if self._first is None else self._first
+        ends = first._cell(values)
+        try:
+            return first._grown_at(frequency, ends)
+        except ConvergenceError:
+            if ends == [values]:
+                raise
+            return first._grown_at(frequency, [values])  # nobody has asked for the ends of the cell
+
+    def serving(self, frequency: float, several: Iterable[Mapping[str, float]]) -> Reduction:
+        """One that serves up to a frequency at all of some values of the parameters, as a motion in time needs it."""
         if self.system.n <= COMPLETE:
             return self
-        at, known = self._expressions(values), [self, *self._larger.values()]
-        serving = next((one for one in known if one._serves(frequency, at)), None)
-        if serving is not None:
-            return serving
-        # it grows from that which lacks least
-        largest = max(known, key=lambda one: (one._known_to(at), len(one._tested)))
-        for there in (largest._ahead(frequency, values, at), values):
-            key = frequency, self._expressions(there).tobytes()
-            try:
-                largest = _kept(self._larger, key, partial(largest._grown_to, frequency, there))
-            except ConvergenceError:
-                if there is values:  # none ahead is asked for
-                    raise
-            if largest._serves(frequency, at):
-                break
-        return largest
+        first = self if self._first is None else self._first
+        ends: list[Mapping[str, float]] = []
+        for values in several:
+            ends += [end for end in first._cell(values) if end not in ends]
+        return first._grown_at(frequency, ends)
+
+    def _grown_at(self, frequency: float, ends: list[Mapping[str, float]]) -> Reduction:
+        """The basis that has grown from this one, a first one, at some values of the parameters."""
+        key = frequency, *(self._expressions(values).tobytes() for values in ends)
+
+        def grown() -> Reduction:
+            larger = self
+            for values in ends:
+                if not larger._serves(frequency, self._expressions(values)):
+                    larger = larger._grown_to(frequency, values)
+            if larger is not self:
+                larger._first = self
+            return larger
+
+        return _kept(self._larger, key, grown)
 
     def _known_to(self, at: Array) -> float:
         """Up to which frequency it was tested there, negative where it was not."""
@@ -172,26 +191,29 @@ class Reduction:
         """Whether it was tested there, or on both sides near by."""
         tested = [one.at for one in self._tested if one.covers >= frequency]
         return any(
-            _far(one, other) <= _NEAR and np.all((np.minimum(one, other) <= at) & (at <= np.maximum(one, other)))
+            _far(one, other) <= _NEAR and _is_between(at, one, other)
             for one, other in combinations_with_replacement(tested, 2)
         )
 
-    def _ahead(self, frequency: float, values: Mapping[str, float], at: Array) -> Mapping[str, float]:
-        """Values of the parameters beyond some, as seen from the nearest that were tested, as far from these as may be;
-        those themselves where there are none near.
+    def _cell(self, values: Mapping[str, float]) -> list[Mapping[str, float]]:
+        """The ends of the cell of parameters that holds these values, as seen from those of a first basis; the values
+        themselves where there is no cell in which expressions in the matrices are near each other.
         """
-        near = min((one for one in self._tested if one.covers >= frequency), key=lambda t: _far(t.at, at), default=None)
-        ahead, times = values, _STEP
-        while near is not None and times <= _AHEAD:
-            further = {name: near.values[name] + times * (value - near.values[name]) for name, value in values.items()}
+        own, at = self._tested[0].values, self._expressions(values)
+        moved = [name for name, value in values.items() if value not in (own[name], 0.0)]
+        share = 1.0 if np.any(at != self._tested[0].at) else 0.0
+        for _ in range(_HALVINGS if share else 0):
+            low, high = dict(values), dict(values)
+            for name in moved:
+                low[name], high[name] = _between_powers(values[name], own[name], (1.0 - _NEAR) ** -share)
+            share *= 0.5
             try:
-                beyond = self._expressions(further)
+                below, above = self._expressions(low), self._expressions(high)
             except InputError:  # an expression is none there
-                break
-            if not _far(near.at, beyond) <= _NEAR:
-                break
-            ahead, times = further, _STEP * times
-        return ahead
+                continue
+            if _far(below, above) <= _NEAR and _is_between(at, below, above):
+                return [low, high]
+        return [values]
 
     def _grown_to(self, frequency: float, values: Mapping[str, float]) -> Reduction:
         at, larger = self._expressions(values), copy.copy(self)
@@ -360,6 +382,17 @@ def _kept(
     if found is None:
         found = known[key] = make()
     return found
+
+
+def _between_powers(value: float, unit: float, ratio: float) -> tuple[float, float]:
+    """The powers of a ratio, times a unit of the same sign, that a value lies between."""
+    unit = unit if unit * value > 0.0 else math.copysign(1.0, value)
+    power = math.floor(math.log(value / unit) / math.log(ratio))
+    return unit * ratio**power, unit * ratio ** (power + 1)
+
+
+def _is_between(at: Array, one: Array, other: Array) -> bool:
+    return bool(np.all((np.minimum(one, other) <= at) & (at <= np.maximum(one, other))))
 
 
 def _far(one: Array, other: Array) -> float:

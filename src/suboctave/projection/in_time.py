@@ -47,9 +47,9 @@ def small_system(
     linear = linear_part_of(system, None, (HARMONICS + 0.5) * omega, None, watched)
     inside = frozenset[str]().union(*(matrix.names for matrix in system.linear_parts))
     names = [name for name in varied or {} if name in inside]
-    for values in product(*((varied or {})[name] for name in names)) if names else ():
-        # the basis grows by what it needs there, and keeps what it has
-        linear = linear.rebuilt({**system.parameters, **dict(zip(names, values, strict=True))})
+    if names and isinstance(linear, Condensed):
+        corners = [dict(zip(names, values, strict=True)) for values in product(*((varied or {})[n] for n in names))]
+        linear = linear.serving(linear.covers, [{**system.parameters, **corner} for corner in corners])
     return in_basis(system, linear, watched)
 
 
@@ -64,9 +64,9 @@ def system_of_motions(motions: Sequence[PeriodicOrbit]) -> System:
     if first.system.n <= COMPLETE:
         return first.system
     linear = first.state().linear
-    for motion in motions[1:]:
-        # a basis grows along a curve: the last one serves all of it
-        linear = linear.rebuilt(motion.values).covering(motion.omega * float(motion.basis.multiples[-1]))
+    if isinstance(linear, Condensed):
+        highest = max(motion.omega * float(motion.basis.multiples[-1]) for motion in motions)
+        linear = linear.serving(highest, [motion.values for motion in motions])
     return in_basis(first.system, linear, [first.system.observed_dof])
 
 
