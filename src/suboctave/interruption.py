@@ -150,7 +150,11 @@ _FAILED: ContextVar[list[tuple[str, BaseException | None]] | None] = ContextVar(
 
 @contextmanager
 def users_function(name: str) -> Iterator[None]:
-    """A function of the user's is called within, `name` says which: what it raises is one that failed."""
+    """A function of the user's is called within, `name` says which: what it raises is one that failed.
+
+    It may be slow: time limits are looked at.
+    """
+    check_time()
     try:
         yield
     except SuboctaveError:

@@ -251,3 +251,17 @@ def test_the_nearest_motion_in_the_range_is_said_to_be_no_start(hardening):
     assert curve.omega.max() <= 2.7
     elsewhere = bool(abs(curve.omega[0] - 2.7) > 1e-3)
     assert any("the curve begins at the nearest one" in note for note in curve.warnings) is elsewhere
+
+
+# mass of the light DOF, sliding force and width of its law
+@pytest.mark.parametrize(("mass", "force", "width"), [(0.05, 0.1, 0.03), (0.0407, 0.1123, 0.0328), (0.08, 0.12, 0.02)])
+def test_friction_at_a_light_dof_starts_whatever_harmonics_it_asks_for(mass, force, width):
+    """Where few harmonics let a body slide that sticks with more, more and fewer are asked for in turn."""
+    stiffness = [[2.0, -1.0, 0.0], [-1.0, 1.5, -0.5], [0.0, -0.5, 0.5]]
+    laws, loads = [so.TanhFriction(2, force, width)], [so.HarmonicLoad(0, 0.1)]
+    system = so.System(np.diag([1.0, 1.0, mass]), 0.02 * np.eye(3), stiffness, laws, loads)
+    start = so.frequency_response(system, (0.4, 0.42)).orbits[0]
+    fixed = so.frequency_response(system, (0.4, 0.42), harmonics=41).orbits[0]
+    amplitudes = [[orbit.amplitude(dof) for dof in range(3)] for orbit in (start, fixed)]
+    assert amplitudes[0] == pytest.approx(amplitudes[1], rel=1e-4)
+    assert start.truncation < 1e-5

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
 import signal
@@ -411,3 +412,105 @@ def test_figures_that_cannot_be_drawn_of_a_complete_study_are_said(study_file, s
     assert status == 2
     assert "outputs.figures[0] is not drawn" in err
     assert (path.parent / "study_results" / "b.svg").exists()
+
+
+# ---------------------------------------------------------------------------------------- functions of users that fail
+FAILING = """
+title = "Duffing"
+[system]
+mass = 1.0
+damping = 0.1
+stiffness = 1.0
+elements = [{ type = "Callable", dof = 0, function = { callable = "functions_of_a_user:law" } }]
+loads = [{ type = "HarmonicLoad", dof = 0, amplitude = "F" }]
+parameters = { F = 0.3 }
+
+[[analyses]]
+name = "watched"
+type = "frequency_response"
+omega = [2.5, 0.8]
+events = [{ name = "hot", function = "functions_of_a_user:hot" }]
+
+[[analyses]]
+name = "from it"
+type = "continue_branch"
+start = { analysis = "watched", point = 1 }
+parameter = "F"
+bounds = [0.2, 0.35]
+
+[[analyses]]
+name = "strong"
+type = "frequency_response"
+omega = [2.5, 0.8]
+parameters = { F = 3.0 }
+
+[[analyses]]
+name = "last"
+type = "frequency_response"
+omega = [2.5, 2.2]
+"""
+FUNCTIONS = """
+import numpy as np
+def law(x, v):
+    if np.abs(x).max() > LARGEST:
+        raise ArithmeticError("out of the table")
+    return x**3
+def hot(motion):
+    if motion.omega < 2.0:
+        raise RuntimeError("no sensor")
+    return 1.0
+"""
+
+
+@pytest.fixture
+def failing(study_file, monkeypatch, tmp_path):
+    """A study with a law and an event that fail on the way."""
+
+    def write(text):
+        (tmp_path / "functions_of_a_user.py").write_text(text)
+        sys.modules.pop("functions_of_a_user", None)
+        importlib.invalidate_caches()
+        return study_file(FAILING)
+
+    monkeypatch.syspath_prepend(tmp_path)
+    yield write
+    sys.modules.pop("functions_of_a_user", None)
+
+
+def test_functions_that_fail_cost_their_analysis_alone(failing, tmp_path):
+    study = failing(FUNCTIONS.replace("LARGEST", "2.0"))
+    outcome = run_study(read_study(study, allow_code=True))
+    assert list(outcome.failures) == ["watched", "strong"]
+    assert "the function of the event 'hot' failed with RuntimeError: no sensor" in outcome.failures["watched"]
+    assert "out of the table" in outcome.failures["strong"]
+    assert not outcome.interrupted
+    done = {item.step.name: item.result for item in outcome.finished}
+    assert done["watched"].omega[-1] < 2.3  # as far as it came, and what starts from it
+    assert len(done["from it"]) > 2
+    assert len(done["last"]) > 2
+    # the functions are mended: what is complete and does not call them is taken over
+    study = failing(FUNCTIONS.replace("LARGEST", "1e9").replace("motion.omega < 2.0", "False"))
+    outcome = run_study(read_study(study, allow_code=True), resume=True)
+    assert not outcome.failures
+    assert [item.step.name for item in outcome.finished if item.reused] == []  # another law is another system
+
+
+def test_functions_that_fail_are_said_on_the_command_line(failing, suboctave):
+    status, printed, _ = suboctave("run", failing(FUNCTIONS.replace("LARGEST", "2.0")), "--allow-code")
+    assert status != 0
+    assert "failed. beyond omega = " in printed
+    assert "no sensor" in printed
+    assert "failed: watched, strong. Change the study, and go on with --resume" in printed
+
+
+def test_a_mistake_of_ours_costs_its_analysis_alone(study_file, monkeypatch):
+    def divides(self, around):
+        return {}["nothing"]
+
+    study = read_study(study_file(DUFFING + "\n" + DUFFING[DUFFING.index("[[analyses]]"):].replace(
+        '"response"', '"again"').split("[[analyses]]\nname = \"up\"")[0]))  # fmt: skip
+    monkeypatch.setattr(type(study.steps[1]), "run", divides)
+    outcome = run_study(study)
+    assert list(outcome.failures) == ["up"]
+    assert "KeyError" in outcome.failures["up"]
+    assert [item.step.name for item in outcome.finished if item.result is not None] == ["response", "again"]
