@@ -551,8 +551,10 @@ class _Follower(Driver):
         with suppress(TypeError, ValueError, OverflowError):
             if np.isfinite(number := float(value)):
                 return number
-        what = f"the function of the event {event.name!r} returned {value!r} at {sample.where}"
-        raise stopping(f"{what}; it must return a finite number")
+        raise stopping(
+            f"the function of the event {event.name!r} returned {value!r} at {sample.where}; it must return a finite "
+            "number"
+        )
 
     def _event(self, event: Event, a: Sample, b: Sample) -> Bifurcation | None:
         value_a, value_b = (self._event_value(event, sample) for sample in (a, b))
