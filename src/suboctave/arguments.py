@@ -63,9 +63,12 @@ Positive = Annotated[float, Rule("a positive number", lambda x: x > 0.0)]
 NotNegative = Annotated[float, Rule("a number of at least 0", lambda x: x >= 0.0)]
 Share = Annotated[float, Rule("a number between 0 and 1", lambda x: 0.0 < x < 1.0)]
 #: without an upper end
-Length = Annotated[float, ANY_SIZE, Rule("a positive number", lambda x: x > 0.0)]
-Count = Annotated[int, Rule(f"a positive whole number of at most {_MOST}", lambda n: 1 <= n <= _MOST)]
-Index = Annotated[int, Rule("a whole number of at least 0", lambda n: n >= 0)]
+Length = Annotated[float, Rule("a positive number", lambda x: x > 0.0), ANY_SIZE]
+_FEW_ENOUGH = Rule(f"at most {_MOST}", lambda n: n <= _MOST)
+Count = Annotated[int, Rule("a positive whole number", lambda n: n >= 1), _FEW_ENOUGH]
+Index = Annotated[int, Rule("a whole number of at least 0", lambda n: n >= 0), _FEW_ENOUGH]
+#: what the callable makes a matrix of
+Matrix = Annotated[Any, Rule("a matrix of numbers", lambda value: array_like(value))]
 Name = Annotated[str, Rule("a text that is not empty", bool)]
 Progress = Callable[[float, str], Any] | bool | None
 
@@ -136,7 +139,10 @@ def _whole(value: Any) -> Any:
 
 
 def _is_file_name(value: Any) -> bool:
-    return isinstance(value, str | os.PathLike) and isinstance(os.fspath(value), str)
+    if not isinstance(value, str | os.PathLike):
+        return False
+    name = os.fspath(value)
+    return isinstance(name, str) and "\0" not in name
 
 
 def _array_of(value: Any) -> Any:
@@ -163,14 +169,12 @@ def _array(words: str, allowed: str) -> Reading:
     return Reading(words, words.replace("an array", "arrays"), read)
 
 
-def _is_array_like(value: Any) -> bool:
-    """Whether NumPy makes something else than an object of it."""
-    array = _array_of(value)
-    return (
-        isinstance(value, str | Mapping)
-        or hasattr(value, "toarray")
-        or (array is not None and array.dtype.kind in "biufcU")
-    )
+def array_like(value: Any, kinds: str = "biufcU") -> bool:
+    """Whether it is a sparse matrix, or NumPy makes an array of these kinds of it: numbers and texts, no objects."""
+    if hasattr(value, "toarray"):
+        return True
+    array = None if isinstance(value, str) else _array_of(value)
+    return array is not None and array.dtype.kind in kinds
 
 
 _ANYTHING = Reading("anything", "anything", _anything)
@@ -184,7 +188,7 @@ _TEXT = _reading("a text", _is_text)
 _FILE = _reading("the name of a file", _is_file_name, "names of files")
 _ARRAY = _array("an array of numbers", "biufc")
 _OBJECTS = _array("an array", "biufcUO")
-_LIKE = _reading("an array of numbers", _is_array_like, "arrays of numbers")
+_LIKE = _reading("an array of numbers", lambda value: array_like(value, "biuf"), "arrays of numbers")
 #: kinds of NumPy from which those of an array that is asked for can be made
 _KINDS = {"f": "biuf", "c": "biufc", "i": "iu", "u": "iu", "b": "b"}
 _SINGLE = {
@@ -199,6 +203,8 @@ def _instance(kind: Any) -> Reading:
     words = f"{'an' if name[0] in 'AEIOU' else 'a'} {name}"
     if isinstance(kind, _Absent):
         return _reading(words, lambda value: any(base.__name__ == name for base in type(value).__mro__))
+    if typing.is_typeddict(kind):
+        return _mapping(_TEXT, _ANYTHING)
     if getattr(kind, "_is_protocol", False):
         wanted = [part for part in {*vars(kind), *vars(kind).get("__annotations__", {})} if not part.startswith("_")]
         return _reading(
@@ -243,10 +249,9 @@ def _is_ordered(value: Any) -> bool:
     """Whether it holds things one after the other: no text, no set, no mapping."""
     if isinstance(value, str | bytes | bytearray | Mapping | collections.abc.Set):
         return isinstance(value, collections.abc.KeysView | collections.abc.ItemsView)
-    if isinstance(value, Sequence | collections.abc.ValuesView):
-        return True
-    # arrays, and columns of tables
-    return getattr(value, "ndim", 0) >= 1 and hasattr(value, "__len__") and not hasattr(value, "data_vars")
+    if isinstance(value, type) or not (hasattr(value, "__len__") and hasattr(value, "__iter__")):
+        return False
+    return bool(getattr(value, "ndim", 1) == 1 or (isinstance(value, np.ndarray) and value.ndim))
 
 
 def _items(value: Any, readings: Iterator[Reading]) -> Any:
@@ -321,7 +326,7 @@ def _mapping(key: Reading, item: Reading) -> Reading:
 def _union(readings: Sequence[Reading]) -> Reading:
     shown = [one for one in dict.fromkeys(readings) if one is not _NONE]
     words = [one.words for one in shown]
-    text = ", ".join(words[:-1]) + (", " if " or " in words[-1] else " or ") * (len(words) > 1) + words[-1]
+    text = ", ".join(words[:-1]) + (", or " if " or " in words[-1] else " or ") * (len(words) > 1) + words[-1]
     optional, alternatives = len(shown) < len(readings), [one.read for one in shown]
     if any(one.read is _anything for one in shown):
         return Reading(text, text, _anything)
@@ -344,15 +349,16 @@ def _union(readings: Sequence[Reading]) -> Reading:
 
 
 def _with_rules(reading: Reading, rules: Sequence[Rule]) -> Reading:
-    words = next((rule.words for rule in reversed(rules) if rule.words), reading.words)
+    words = next((rule.words for rule in rules if rule.words), reading.words)
 
     def read(value: Any) -> Any:
         try:
             used = reading.read(value)
         except Unfit as unfit:
             raise unfit if unfit.place else Unfit(words, value) from None
-        if not all(rule.holds(used) for rule in rules):
-            raise Unfit(words, value)
+        for rule in rules:
+            if not rule.holds(used):
+                raise Unfit(rule.words, value)
         return used
 
     return Reading(words, words.split(" ", 1)[-1] + "s" if words != reading.words else reading.several, read)
@@ -490,9 +496,7 @@ class _Table:
     """How the arguments of a callable are read; made when it is first called."""
 
     def __init__(self, function: Callable[..., Any], owner: type | None, options: Checks) -> None:
-        constructs = owner is not None and function.__name__ == "__init__"
-        self.name = owner.__name__ if owner is not None and constructs else function.__name__
-        self.prefix = f"{self.name}: " if constructs else ""
+        self.name = owner.__name__ if owner is not None and function.__name__ == "__init__" else function.__name__
         self.readings: dict[str, Reading] = {}
         #: names of arguments by place, and of those that have no other name to their caller
         self.places: list[str] = []
@@ -542,9 +546,7 @@ class _Table:
         except Unfit as unfit:
             where = name + "".join(f"[{shortened(key)}]" for key in unfit.place)
             key = (name, *(part for part in unfit.place if isinstance(part, str | int)))
-            raise InputError(
-                f"{self.prefix}{where} must be {unfit.words}, not {shortened(unfit.value)}{unfit.hint}", key
-            ) from None
+            raise InputError(f"{where} must be {unfit.words}, not {shortened(unfit.value)}{unfit.hint}", key) from None
 
 
 def _refuse_masked(value: Any) -> None:
@@ -584,8 +586,10 @@ def checked(
         if name != "__init__" and (name.startswith("_") or not methods):
             continue
         kind = type(member) if isinstance(member, staticmethod | classmethod) else None
-        function, owner = member.__func__ if kind else member, None if kind is staticmethod else given
-        if isinstance(function, types.FunctionType) and function.__code__.co_argcount > (owner is not None):
+        function = member.__func__ if kind else member
+        owner = None if kind is staticmethod else given
+        count = len(inspect.signature(function).parameters) if isinstance(function, types.FunctionType) else 0
+        if count > (owner is not None):
             wrapped = _compared(function, owner, checks)
             setattr(given, name, kind(wrapped) if kind else wrapped)
     return given
@@ -593,6 +597,7 @@ def checked(
 
 def _compared(function: Any, owner: type | None, checks: Checks) -> Any:
     first, inside = int(owner is not None), checks.result
+    constructs = owner is not None and function.__name__ == "__init__"
     table: _Table | None = None
 
     @functools.wraps(function)
@@ -602,7 +607,14 @@ def _compared(function: Any, owner: type | None, checks: Checks) -> Any:
             return function(*positional, **named)
         if table is None:
             table = _Table(function, owner, checks)
-        return function(*positional[:first], *table.placed(positional[first:]), **table.named(named))
+        try:
+            used = table.named(named)
+            placed = table.placed(positional[first:])
+        except InputError as error:
+            if constructs:
+                error.args = (f"{type(positional[0]).__name__}: {error}",)
+            raise
+        return function(*positional[:first], *placed, **used)
 
     compared.__checked__ = True  # type: ignore[attr-defined]
     return compared

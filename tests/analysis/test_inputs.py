@@ -82,7 +82,7 @@ RESPONSE = {
     "event without name": (lambda s, b: so.Event("", len), "name must be a text that is not empty"),
     "progress": (
         lambda s, b: so.frequency_response(s, (1, 2), progress=3),
-        "progress must be a function of 2 arguments, True or False, not 3",
+        "progress must be a function of 2 arguments, or True or False, not 3",
     ),
     "newton": (lambda s, b: so.frequency_response(s, (1, 2), newton={}), "newton must be a NewtonOptions, not {}"),
     "stepping": (lambda s, b: so.frequency_response(s, (1, 2), stepping=0.1), "must be a SteppingOptions, not 0.1"),

@@ -203,7 +203,7 @@ def test_observed_degree_of_freedom():
         (lambda: System(np.diag([1.0, 0.0]), 0, np.eye(2)), "diagonal entry at dof 1 is 0"),
         (lambda: System("m", 0, 1, parameters={"m": -1.0}), "diagonal entry at dof 0 is -1"),
         (lambda: System(1, "2*zeta", 1), "damping: unknown parameter 'zeta' in the expression '2\\*zeta'"),
-        (lambda: System(1, "2*zta", 1, parameters={"zeta": 1}), "did you mean 'zeta'"),
+        (lambda: System(1, "2*zta", 1, parameters={"zeta": 1}), "'zeta' is given and used nowhere: one of the two"),
         (lambda: System(1, 0, [["k*"]], parameters={"k": 1}), "stiffness\\[0, 0\\]: cannot read"),
         (lambda: System(1, 0, [[None]]), "stiffness\\[0, 0\\]: a coefficient is a number"),
         (lambda: System(1, 0, "omega"), "only loads may depend on the frequency"),

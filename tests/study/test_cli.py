@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import re
+import shlex
 import subprocess
 import sys
+from pathlib import Path
 
+import numpy as np
 import pytest
 
 import suboctave
-from suboctave.study import cli, demo
+from suboctave.atomic import replace_file
+from suboctave.study import cli, demo, shown
 
 
 def run(*arguments, check=0, cwd=None):
@@ -108,3 +112,63 @@ def test_negative_damping_is_a_note_once_and_the_study_runs(study_file, suboctav
     assert err.count("note: the damping matrix feeds energy into some motions") == 1
     assert "damping_check" not in err
     assert "in order" in out
+
+
+def test_ctrl_c_inside_a_command_is_said(monkeypatch, suboctave, study_file):
+    """Typer ends a command that is interrupted without a word."""
+
+    def stop(*given):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("suboctave.study.file.read_study", stop)
+    status, _, said = suboctave("check", study_file())
+    assert (status, said) == (130, "interrupted\n")
+
+
+def test_a_sweep_that_is_stopped_before_its_first_point_says_so_and_leaves_nothing(monkeypatch, suboctave, study_file):
+    def stop(*given):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("suboctave.study.sweeps.verb.completed", stop)
+    study = study_file()
+    folder = study.parent / "swept"
+    status, _, said = suboctave("sweep", study, "--grid", "F=0.1,0.2", "--out", folder)
+    assert status == 130
+    assert said.endswith("interrupted before the first point was computed: nothing is kept\n")
+    assert list(folder.iterdir()) == []
+
+
+def test_the_command_that_goes_on_is_whole(monkeypatch, suboctave, study_file):
+    study = study_file()
+    folder = study.parent / "else where"
+    status, out, _ = suboctave("run", study, "--out", folder, "--seconds", "0.05")
+    assert status == 1
+    again = out.partition("go on: suboctave ")[2].strip()
+    assert shlex.split(again) == ["run", str(study), "--out", str(folder), "--resume"]
+    assert suboctave(*shlex.split(again))[0] == 0  # it does
+
+
+def test_a_full_disk_is_said_with_the_file(tmp_path):
+    """/dev/full answers as a full disk does; HDF5 says the number of the failure in its own words."""
+    target = tmp_path / "table.csv"
+    for fails in (
+        lambda place: Path("/dev/full").write_text("x"),
+        lambda place: (_ for _ in ()).throw(OSError("Can't write data (file write failed: errno = 28, error message")),
+    ):
+        with pytest.raises(OSError, match="No space left on device") as full:
+            replace_file(target, fails)
+        assert (full.value.filename, full.value.errno) == (str(target), 28)
+        assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("values", "span"),
+    [
+        ([2.5, 1.0, 0.5], "2.5 to 0.5"),
+        ([0.1, 0.3, 0.1], "between 0.1 and 0.3"),
+        ([0.1, 0.4, 0.2], "between 0.1 and 0.4"),
+        ([0.1], "at 0.1"),
+    ],
+)
+def test_the_path_of_a_curve_that_turns_back_is_what_it_covers(values, span):
+    assert shown._span(np.array(values)) == span

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from suboctave.analysis.options import Inherited, settings_of
-from suboctave.arguments import checked
+from suboctave.arguments import Positive, checked
 from suboctave.bifurcation.bifurcation import TrackedEvent
 from suboctave.continuation import NewtonOptions
 from suboctave.continuation.linear import length, one_thread
@@ -45,7 +45,7 @@ def locate_extremum(
     *,
     formulation: Formulation | str | None = None,
     newton: NewtonOptions | None = None,
-    seconds: float | None = None,
+    seconds: Positive | None = None,
 ) -> TrackedEvent:
     """An extremum of a parameter along a curve of bifurcations, solved for by Newton's method from one that is known.
 

@@ -23,7 +23,7 @@ from suboctave.curves.motion import MotionProblem
 from suboctave.curves.starts import Harmonics, bounded_response, make_curve
 from suboctave.curves.trace import Settings, Trace
 from suboctave.curves.verdicts import with_verdicts
-from suboctave.errors import InputError
+from suboctave.errors import InputError, is_number, shortened
 from suboctave.floquet.methods import METHODS, StabilityMethod, method_of
 from suboctave.harmonic.linear_part import LinearPart
 from suboctave.harmonic.truncation import AdaptiveHarmonics
@@ -90,6 +90,8 @@ def settings_of(system: System, options: Mapping[str, Any]) -> Settings:
     stepping = options.get("stepping") or SteppingOptions()
     max_step = options.get("max_step")
     if max_step is not None:
+        if not (is_number(max_step) and max_step > 0.0):  # of a step in a study file, which is checked before it runs
+            raise InputError(f"max_step must be a positive number, not {shortened(max_step)}")
         if max_step <= stepping.min_step:
             raise InputError(f"max_step={max_step:g} is below the smallest step that is taken, {stepping.min_step:g}")
         stepping = replace(stepping, max_step=float(max_step), initial_step=min(stepping.initial_step, float(max_step)))

@@ -75,6 +75,8 @@ class Sensitivity(Mapping[str, Mapping[str, float]]):
 
     def per_cent(self, name: str, of: str) -> float:
         """Change of `of`, in per cent of its value, when a parameter grows by one per cent of its own."""
+        if of not in self.position:
+            raise InputError(f"of must be a part of the position, not {of!r}{suggest(of, self.position)}")
         value = self.position[of]
         return self[name][of] * self.held[name] / value if value else float("nan")
 

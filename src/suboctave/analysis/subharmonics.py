@@ -17,7 +17,7 @@ import numpy as np
 
 from suboctave.analysis.free_vibrations import Backbone, backbones
 from suboctave.analysis.options import CurveOptions, CurveRun, SearchOptions, settings_of
-from suboctave.arguments import checked
+from suboctave.arguments import Count, Positive, checked
 from suboctave.continuation import CurvePoint, NewtonOptions
 from suboctave.continuation.linear import one_thread
 from suboctave.continuation.newton import correct
@@ -29,7 +29,7 @@ from suboctave.curves.motion import MotionProblem
 from suboctave.curves.sample import Sample
 from suboctave.curves.starts import Harmonics, linear_response, make_curve, start_point
 from suboctave.curves.trace import Trace
-from suboctave.errors import ConvergenceError, InputError
+from suboctave.errors import ConvergenceError
 from suboctave.harmonic.linear_part import LinearPart
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.interruption import Interruption, limited, pass_on
@@ -57,20 +57,9 @@ class Seeds:
         Linear modes tried, from the lowest.
     """
 
-    frequencies: int = 40
-    phases: int = 3
-    modes: int = 3
-
-    def __post_init__(self) -> None:
-        for name in ("frequencies", "phases", "modes"):
-            check_count(f"Seeds: {name}", getattr(self, name))
-
-
-def check_seeds(seeds: Any) -> Seeds | None:
-    """How finely resonances are searched, None for a default."""
-    if seeds is not None and not isinstance(seeds, Seeds):
-        raise InputError(f"seeds must be a Seeds, not {type(seeds).__name__}")
-    return seeds
+    frequencies: Count = 40
+    phases: Count = 3
+    modes: Count = 3
 
 
 def check_order(order: Any) -> int:
@@ -107,7 +96,7 @@ def find_subharmonics(
     order = check_order(subharmonic)
     ends = check_range("omega", omega, positive=True)
     check_system(system, ends)
-    fine = check_seeds(seeds) or Seeds()
+    fine = seeds or Seeds()
     run = CurveRun(system, "omega", ends, harmonics, settings_of(system, options))
     curve = run.curve(ends[0], order, linear)
     with run.reporting(options.get("progress"), f"{period_name(order)} motions") as run:
@@ -205,7 +194,7 @@ def periodic_orbit(
     *,
     settle: int = 0,
     newton: NewtonOptions | None = None,
-    seconds: float | None = None,
+    seconds: Positive | None = None,
 ) -> PeriodicOrbit:
     """The periodic motion near a state `(x, dx/dt)` in time, of one or several load periods, by harmonic balance.
 

@@ -113,7 +113,7 @@ class Bifurcation:
     contact: GrazingContact | None = None
     multiplicity: int = 1
     tangent: tuple[float, ...] | None = field(default=None, repr=False)
-    context: Mapping[str, Any] | None = field(default=None, repr=False)
+    context: Any = field(default=None, repr=False)
 
     @property
     def smooth(self) -> bool:

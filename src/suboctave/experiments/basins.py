@@ -17,7 +17,7 @@ from typing import Annotated, Any, Self, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
-from suboctave.arguments import checked
+from suboctave.arguments import Count, checked
 from suboctave.errors import InputError, path_of
 from suboctave.experiments.basin_attractors import BasinAttractor, Catalogue, Given, enter_attractors, read_attractors
 from suboctave.experiments.common import (
@@ -32,7 +32,7 @@ from suboctave.experiments.common import (
 from suboctave.experiments.poincare import attractor_of
 from suboctave.interruption import Interruption
 from suboctave.model.elements.base import Array
-from suboctave.model.inputs import check_count, check_omega, check_range, start_state, timed
+from suboctave.model.inputs import check_omega, check_range, start_state, timed
 from suboctave.model.projected import coordinates_of
 from suboctave.model.system import System, describe
 from suboctave.options import with_options
@@ -213,13 +213,13 @@ def basins(
     *,
     omega: float,
     box: tuple[tuple[float, float], tuple[float, float]],
-    grid: tuple[int, int] = (200, 200),
+    grid: tuple[Count, Count] = (200, 200),
     plane: tuple[str | int, str | int] | None = None,
     rest: Any = None,
     attractors: Any = None,
     parameters: Mapping[str, float] | None = None,
-    periods: int = 500,
-    keep: Any = None,
+    periods: Count = 500,
+    keep: str | Path | None = None,
     **options: Unpack[BasinOptions],
 ) -> Basins:
     """The basins of attraction on a plane of states at phase 0 of the load.
@@ -259,8 +259,7 @@ def basins(
     check_omega(omega)
     how = checked_integration(system, options, tolerance=1e-8)
     columns = check_plane(system, plane, how.observe)
-    sides, counts = _box(box), _grid(grid)
-    periods = check_count("periods", periods)
+    sides, counts = _box(box), grid
     check_extent(counts[0] * counts[1], periods, counts[0] * counts[1] * 2 * system.n)
     ends = [np.linspace(low, high, count) for (low, high), count in zip(sides, counts, strict=True)]
     states = np.repeat(state[None], counts[0] * counts[1], axis=0)
@@ -294,12 +293,6 @@ def _box(box: Any) -> list[tuple[float, float]]:
         low, high = sorted(check_range(name, tuple(side) if isinstance(side, list | np.ndarray) else side, False))
         sides.append((low, high))
     return sides
-
-
-def _grid(grid: Any) -> tuple[int, int]:
-    if not (isinstance(grid, tuple | list) and len(grid) == 2):
-        raise InputError(f"grid={grid!r}: give the number of cells along both coordinates, such as (200, 200)")
-    return check_count("grid", grid[0]), check_count("grid", grid[1])
 
 
 def _at_boundary(inside: NDArray[np.bool_]) -> NDArray[np.bool_]:

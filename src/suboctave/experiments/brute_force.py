@@ -15,7 +15,7 @@ from typing import Annotated, Any, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
-from suboctave.arguments import checked
+from suboctave.arguments import Count, Index, checked
 from suboctave.errors import InputError, suggest
 from suboctave.experiments.common import (
     FEW,
@@ -33,7 +33,7 @@ from suboctave.experiments.common import (
 from suboctave.experiments.poincare import Attractor, attractor_of, observed_in, recovered_attractor
 from suboctave.interruption import Interruption
 from suboctave.model.elements.base import Array
-from suboctave.model.inputs import check_count, start_state, timed
+from suboctave.model.inputs import start_state, timed
 from suboctave.model.projected import coordinates_of
 from suboctave.model.system import System
 from suboctave.options import with_options
@@ -163,12 +163,12 @@ def brute_force_diagram(
     *,
     parameter: str | None = None,
     values: Any = None,
-    count: int = 200,
+    count: Count = 200,
     start: str | Sequence[str] = ("up", "down"),
     state: Any = None,
     states: Any = None,
-    transient: int = 200,
-    periods: int = 60,
+    transient: Index = 200,
+    periods: Count = 60,
     **options: Unpack[SectionOptions],
 ) -> BruteForceDiagram:
     """Integrate in time over a range of the frequency or of a parameter, for what the motion settles on.
@@ -193,7 +193,6 @@ def brute_force_diagram(
     first = start_state(system, state)
     name, at, grid = varied_grid(system, omega, parameter, values, count)
     fresh, names = starting_states(system, states), _starts(start)
-    periods, transient = check_count("periods", periods), check_count("transient", transient, 0)
     how = checked_integration(system, options)
     labels = (*names, *(f"state {i}" for i in range(len(fresh))))
     trajectories = len(labels) * len(grid)

@@ -27,17 +27,17 @@ from typing import Annotated, Any, ClassVar, Literal, Unpack, overload
 
 import numpy as np
 
-from suboctave.arguments import checked
-from suboctave.errors import ConvergenceError, InputError, check_numbers, shortened, suggest
+from suboctave.arguments import Count, Index, Positive, checked
+from suboctave.errors import ConvergenceError, InputError, shortened, suggest
 from suboctave.experiments.common import On, ParallelOptions, TimeResult, check_continuous, of_structures
 from suboctave.experiments.poincare import state_sizes
 from suboctave.model.elements.base import Array
-from suboctave.model.inputs import check_count, check_omega, start_state, timed
+from suboctave.model.inputs import check_omega, start_state, timed
 from suboctave.model.system import System
 from suboctave.options import with_options
 from suboctave.progress import Report, reporting
 from suboctave.store.plain import Recorded
-from suboctave.timedomain.flow import METHODS, Flow, Motions, check_extent
+from suboctave.timedomain.flow import Flow, Motions, check_extent
 
 #: how far from the first trajectory the others begin, in sizes of the motion
 _APART = 1e-3
@@ -150,12 +150,12 @@ def lyapunov_exponents(
     system: System,
     state: Any = None,
     *,
-    omega: float,
+    omega: Positive,
     parameters: Mapping[str, float] | None = None,
-    periods: int = 1000,
-    transient: int = 300,
-    count: int | None = None,
-    trajectories: int = 16,
+    periods: Count = 1000,
+    transient: Index = 300,
+    count: Count | None = None,
+    trajectories: Count = 16,
     method: Literal["variational"] = "variational",
     tolerance: float | None = None,
     **options: Unpack[ParallelOptions],
@@ -167,7 +167,7 @@ def lyapunov_exponents(
     system: System,
     state: Any = None,
     *,
-    omega: float,
+    omega: Positive,
     parameters: Mapping[str, float] | None = None,
     method: Literal["two_trajectories"] | TwoTrajectories,
     **options: Unpack[ParallelOptions],
@@ -181,12 +181,12 @@ def lyapunov_exponents(
     system: System,
     state: Any = None,
     *,
-    omega: float,
+    omega: Positive,
     parameters: Mapping[str, float] | None = None,
-    periods: int = 1000,
-    transient: int = 300,
-    count: int | None = None,
-    trajectories: int = 16,
+    periods: Count = 1000,
+    transient: Index = 300,
+    count: Count | None = None,
+    trajectories: Count = 16,
     method: str | TwoTrajectories = "variational",
     tolerance: float | None = None,
     **options: Unpack[ParallelOptions],
@@ -235,11 +235,9 @@ def lyapunov_exponents(
     if method != "variational":
         raise InputError(f"method={method!r}{suggest(str(method), ('variational', 'two_trajectories'))}")
     size = 2 * system.n
-    count = size if count is None else check_count("count", count)
+    count = size if count is None else count
     if count > size:
         raise InputError(f"count={count}: a system of {system.n} degrees of freedom has {size} exponents")
-    periods, trajectories = check_count("periods", periods), check_count("trajectories", trajectories)
-    transient = check_count("transient", transient, 0)
     check_extent(trajectories, transient + periods, trajectories * periods * (count + 1))
     flow = Flow(system, "accurate", tolerance=tolerance, tangents=count)
     with reporting(options.get("progress"), "Lyapunov exponents") as report:
@@ -345,31 +343,23 @@ class TwoTrajectories:
         The distance, relative to the largest of the motion, at which the exponential growth is over.
     """
 
-    offset: float | tuple[float, ...] = 1e-14
-    integrator: str = "newmark"
-    steps_per_period: tuple[int, ...] = tuple(range(400, 1400, 10))
-    tolerances: tuple[float, ...] = (1e-12, 1e-11, 1e-10, 1e-9, 1e-8)
-    periods: int = 300
-    saturation: float = 1e-2
+    offset: Positive | tuple[Positive, ...] = 1e-14
+    integrator: Literal["newmark", "accurate"] = "newmark"
+    steps_per_period: tuple[Count, ...] = tuple(range(400, 1400, 10))
+    tolerances: tuple[Positive, ...] = (1e-12, 1e-11, 1e-10, 1e-9, 1e-8)
+    periods: Count = 300
+    saturation: Positive = 1e-2
 
     def __post_init__(self) -> None:
-        if self.integrator not in METHODS:
-            raise InputError(f"integrator={self.integrator!r} must be one of {', '.join(METHODS)}")
-        check_count("periods", self.periods)
-        given: Any
         for name, given in (("steps_per_period", self.steps_per_period), ("tolerances", self.tolerances)):
-            if not isinstance(given, Sequence) or isinstance(given, str) or not given:
+            if not len(given):
                 raise InputError(f"{name} must be several numbers, one for each setting, not {shortened(given)}")
-        if self.offset == ():
+        if isinstance(self.offset, tuple) and not self.offset:
             raise InputError("offset must be a number or several of them, not none")
         for offset in self.offset if isinstance(self.offset, tuple) else (self.offset,):
-            check_numbers(offset=offset)
-            if not 0.0 < offset < 1.0:
+            if offset >= 1.0:
                 raise InputError(f"offset={self.offset!r} must be positive, and far below the size of the motion")
-        for steps in self.steps_per_period:
-            check_count("steps_per_period", steps)
-        check_numbers(saturation=self.saturation)
-        if not 0.0 < self.saturation <= 1.0:
+        if self.saturation > 1.0:
             raise InputError(f"saturation={self.saturation!r} must be a share of the size of the motion, up to 1")
 
     @property

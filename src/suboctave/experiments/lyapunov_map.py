@@ -9,7 +9,7 @@ from typing import Annotated, Any, Protocol, Unpack, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from suboctave.arguments import checked
+from suboctave.arguments import Count, Index, Positive, checked
 from suboctave.errors import InputError
 from suboctave.experiments.common import (
     On,
@@ -22,7 +22,7 @@ from suboctave.experiments.common import (
 )
 from suboctave.experiments.lyapunov import over_stretches, smooth_weights
 from suboctave.model.elements.base import Array
-from suboctave.model.inputs import check_count, check_parameter, start_state, timed
+from suboctave.model.inputs import check_parameter, start_state, timed
 from suboctave.model.system import System
 from suboctave.options import with_options
 from suboctave.progress import reporting
@@ -125,12 +125,12 @@ def lyapunov_map(
     *,
     parameter: str,
     values: Any,
-    counts: tuple[int, int] = (60, 40),
+    counts: tuple[Count, Count] = (60, 40),
     state: Any = None,
     parameters: Mapping[str, float] | None = None,
-    transient: int = 200,
-    periods: int = 400,
-    tolerance: float = 1e-8,
+    transient: Index = 200,
+    periods: Count = 400,
+    tolerance: Positive = 1e-8,
     **options: Unpack[ParallelOptions],
 ) -> LyapunovMap:
     """The largest Lyapunov exponent over the frequency and a parameter; all processors work.
@@ -155,12 +155,9 @@ def lyapunov_map(
     fixed = system.read_values(parameters)
     if parameter in fixed:
         raise InputError(f"parameters= fixes {parameter}, which is to be varied")
-    if not (isinstance(counts, tuple | list) and len(counts) == 2):
-        raise InputError(f"counts={counts!r}: give the number of frequencies and that of values, such as (60, 40)")
-    transient, periods = check_count("transient", transient, 0), check_count("periods", periods)
     if periods < 2 * _STRETCHES:
         raise InputError(f"periods={periods}: take at least {2 * _STRETCHES}, for the standard errors")
-    cells = check_count("counts", counts[0]) * check_count("counts", counts[1])
+    cells = counts[0] * counts[1]
     check_extent(cells, transient + periods, 2 * cells * periods * system.n)
     frequencies = checked_range("omega", omega, counts[0], True)
     at = system.with_parameters(fixed) if fixed else system

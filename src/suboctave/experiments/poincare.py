@@ -9,7 +9,7 @@ from typing import Annotated, Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from suboctave.arguments import checked
+from suboctave.arguments import Count, Index, checked
 from suboctave.errors import InputError
 from suboctave.experiments.common import (
     On,
@@ -22,7 +22,7 @@ from suboctave.experiments.common import (
     watched_states,
 )
 from suboctave.model.elements.base import Array
-from suboctave.model.inputs import check_count, start_state, timed
+from suboctave.model.inputs import start_state, timed
 from suboctave.model.projected import ProjectedSystem, coordinates_of
 from suboctave.model.system import System
 from suboctave.options import with_options
@@ -168,8 +168,8 @@ def poincare_sections(
     *,
     omega: ArrayLike,
     parameters: Mapping[str, ArrayLike] | None = None,
-    transient: int = 300,
-    periods: int = 60,
+    transient: Index = 300,
+    periods: Count = 60,
     **options: Unpack[SectionOptions],
 ) -> PoincareSections:
     """Follow many trajectories and keep their states once in every period of the load, on all processors.
@@ -185,7 +185,6 @@ def poincare_sections(
     """
     if states is None or not isinstance(states, list | tuple | np.ndarray):
         states = start_state(system, states)
-    periods, transient = check_count("periods", periods), check_count("transient", transient, 0)
     how = checked_integration(system, options)
     flow = Flow(system, how.method, 1, how.steps, how.tolerance)
     with reporting(options.get("progress"), "Poincaré sections") as report:

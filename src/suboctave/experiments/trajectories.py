@@ -8,7 +8,7 @@ from typing import Annotated, Any, Unpack
 
 import numpy as np
 
-from suboctave.arguments import checked
+from suboctave.arguments import Count, Index, Positive, checked
 from suboctave.experiments.common import (
     FEW,
     On,
@@ -20,7 +20,7 @@ from suboctave.experiments.common import (
     watched_states,
 )
 from suboctave.model.elements.base import Array
-from suboctave.model.inputs import check_count, check_omega, start_state, timed
+from suboctave.model.inputs import check_omega, start_state, timed
 from suboctave.model.system import System
 from suboctave.options import with_options
 from suboctave.progress import reporting
@@ -106,13 +106,13 @@ def integrate(
     system: System,
     state: Any = None,
     *,
-    omega: float,
-    periods: int = 10,
-    transient: int = 0,
-    steps_per_period: int | None = None,
+    omega: Positive,
+    periods: Count = 10,
+    transient: Index = 0,
+    steps_per_period: Count | None = None,
     parameters: Mapping[str, float] | None = None,
     method: str = "accurate",
-    tolerance: float | None = None,
+    tolerance: Positive | None = None,
     **options: Unpack[TimeOptions],
 ) -> Trajectory:
     """Integrate the equation of motion in time, from phase 0 of the load over whole periods.
@@ -145,11 +145,9 @@ def integrate(
     ConvergenceError
         If the motion leaves the range of numbers, or Newmark's equations could not be solved.
     """
-    periods = check_count("periods", periods)
     samples = steps_of(method, steps_per_period)
     start = start_state(system, state)
     flow = Flow(system, method, samples, samples, tolerance, lanes=FEW, folded=False)
-    transient = check_count("transient", transient, 0)
     values, omega = system.read_values(parameters), check_omega(omega)
     if system.turns:
         start = _within_a_turn(system, start, omega, transient, values, method, samples, tolerance)

@@ -167,10 +167,12 @@ class Equations:
         """Whether the forces of the elements do not depend on omega at fixed X."""
         return not (self.any_moving or self.own)
 
+    @checked(result=True)
     def with_samples(self: _Same, samples: tuple[int | None, ...]) -> _Same:
         """The same equations with other frozen sample counts."""
         return self if samples == self.samples else self._like(self.basis, samples)
 
+    @checked(result=True)
     def with_basis(self: _Same, basis: HarmonicBasis) -> _Same:
         """The same equations in another basis."""
         return self if basis == self.basis else self._like(basis, self.samples)
@@ -189,7 +191,12 @@ class Equations:
 
     def shaped(self, vector: Array) -> Array:
         """A vector of the equations' dimension as coefficients, shape (2 H + 1, size)."""
-        return vector.reshape(self.basis.size, self.size)
+        try:
+            return vector.reshape(self.basis.size, self.size)
+        except ValueError:
+            raise InputError(
+                f"x must be coefficients of shape {(self.basis.size, self.size)}, not {vector.shape}"
+            ) from None
 
     def per_unknown(self, scale: Array) -> Array:
         """A factor per DOF, (size,), for every unknown, shape (dimension,)."""

@@ -173,6 +173,8 @@ class PeriodicOrbit:
 
     def along(self, direction: Array) -> ComplexArray:
         """Complex amplitudes of `direction . x`, shape (H + 1,); `direction`: (n,), over the structure's DOFs."""
+        if np.shape(direction) != (self.system.n,):
+            raise InputError(f"direction must be {self.system.n} numbers, not of shape {np.shape(direction)}")
         c: ComplexArray = self._moving @ self._linear.seen(direction)
         return c
 

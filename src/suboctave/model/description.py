@@ -19,11 +19,11 @@ import math
 import numbers
 import pkgutil
 from collections.abc import Mapping, MutableMapping
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from suboctave.arguments import checked
+from suboctave.arguments import READ, checked
 from suboctave.errors import InputError, located, shortened, suggest
 from suboctave.model.expressions.coefficients import Coefficient, restored
 from suboctave.model.updated import Updated
@@ -53,7 +53,7 @@ class Recorded:
     def __init_subclass__(cls, family: str = "", **more: Any) -> None:
         super().__init_subclass__(**more)
         if cls.__module__.startswith(_PACKAGE):
-            checked(cls, methods=False)
+            checked(cls, methods=False, hints={"direction": Annotated[Any, READ]})
         if family:
             cls.family = family
         _KNOWN[type_name(cls)] = cls

@@ -154,7 +154,7 @@ class HarmonicLoad(Load):
 
 
 def _listed(given: Any) -> list[Any]:
-    if isinstance(given, Sequence | np.ndarray) and not isinstance(given, str) and getattr(given, "ndim", 1):
+    if isinstance(given, Sequence | np.ndarray) and not isinstance(given, str) and getattr(given, "ndim", True):
         return list(given)
     return [given]
 

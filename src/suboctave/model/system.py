@@ -237,6 +237,7 @@ class System:
             with refusals.at("loads", i):
                 load.check_elements(self.n, self.elements)
         used: set[str] = set()
+        unused = set(self.parameters).difference(*(source.names for _, source, _ in self.expressions()))
         for where, source, key in self.expressions():
             used |= source.names
             for name in sorted(source.names - {"omega"} if key[0] == "loads" else source.names):
@@ -244,7 +245,7 @@ class System:
                     if name == "omega":
                         raise InputError(f"{where}: 'omega' occurs in {source}; only loads may depend on the frequency")
                     if name not in self.parameters:
-                        known = suggest(name, self.parameters) or "; no parameters are given"
+                        known = _meant(name, self.parameters, unused)
                         raise InputError(f"{where}: unknown parameter {name!r} in the expression {source}{known}")
         if not refusals.mistakes:
             for name in self.parameters:
@@ -420,6 +421,15 @@ class System:
         from suboctave.model.display import system_html
 
         return system_html(self)
+
+
+def _meant(name: str, known: Mapping[str, float], unused: set[str]) -> str:
+    """The tail of a message on a name that is no parameter; where one like it is used nowhere, either is misspelt."""
+    alike = suggest(name, unused)
+    if "did you mean" in alike:
+        given = alike.split("'")[1]
+        return f"; {given!r} is given and used nowhere: one of the two is misspelt"
+    return suggest(name, known) or "; no parameters are given"
 
 
 def _assemble(check: bool = False, **parts: Any) -> System:

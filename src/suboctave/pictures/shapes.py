@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 import numpy as np
 
+from suboctave.arguments import Rule, array_like
 from suboctave.atomic import replace_file
 from suboctave.errors import InputError, check_numbers, path_of, shortened
 from suboctave.options import with_options
@@ -49,9 +50,18 @@ class ShapeOptions(PageOptions, total=False):
     seen_from: Annotated[tuple[float, float] | None, "Elevation and azimuth of the eye, degrees; (25, -60) by default."]
 
 
+Field = Annotated[
+    Any,
+    Rule(
+        "displacements, or a motion",
+        lambda given: hasattr(getattr(given, "orbit", given), "displacement") or array_like(given, "biufc"),
+    ),
+]
+
+
 @with_options(ShapeOptions)
 def plot_shape(
-    structure: Structure, field: Any, path: str | Path | None = None, **options: Unpack[ShapeOptions]
+    structure: Structure, field: Field, path: str | Path | None = None, **options: Unpack[ShapeOptions]
 ) -> Figure:
     """Draw a field of displacements on the mesh of a structure, over its outline at rest.
 
@@ -80,7 +90,7 @@ def plot_shape(
 
 @with_options(ShapeOptions)
 def animate_shape(
-    structure: Structure, snapshots: Any, path: str | Path, seconds: float = 2.0, **options: Unpack[ShapeOptions]
+    structure: Structure, snapshots: Field, path: str | Path, seconds: float = 2.0, **options: Unpack[ShapeOptions]
 ) -> Path:
     """Write a motion as a moving picture that repeats for ever.
 

@@ -32,7 +32,7 @@ from suboctave.structures import (
 from suboctave.structures.contents import Contents, chosen, matrix_of
 from suboctave.structures.dof_map import DofMap, direction_label, node_label
 from suboctave.structures.mesh import Mesh
-from suboctave.structures.structure import Structure
+from suboctave.structures.structure import MatrixOrForm, Structure
 from suboctave.structures.text_lines import text_of
 from suboctave.structures.triplets import LabelledEntries, put_together
 
@@ -64,11 +64,11 @@ def read_structure(
     path: FileName | None = None,
     stiffness: FileName | None = None,
     mass: FileName | None = None,
-    damping: Any = None,
+    damping: MatrixOrForm = None,
     dofs: Any = None,
     mesh: Mesh | None = None,
     name: str | None = None,
-    structural: Any = None,
+    structural: MatrixOrForm = None,
 ) -> Structure:
     """A structure from one file with all matrices, or from one file for each.
 

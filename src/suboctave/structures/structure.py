@@ -6,11 +6,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from numbers import Integral
 from os import PathLike
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
-from suboctave.arguments import checked
+from suboctave.arguments import Matrix, Rule, array_like, checked
 from suboctave.errors import InputError, located, path_of, printable, shortened
 from suboctave.model.elements.base import Array, BaseElement
 from suboctave.model.expressions.coefficients import Coefficient, named_coefficient
@@ -23,6 +23,12 @@ from suboctave.structures.dof_map import DofMap, shown_dofs, weighted
 from suboctave.structures.frequencies import NaturalFrequencies, natural_frequencies
 from suboctave.structures.mesh import Mesh
 from suboctave.structures.numpy_files import write
+
+_FORMS = str, PathLike, Coefficient, Rayleigh, ModalDamping, type(None)
+#: a matrix, or what stands for one: a loss factor, `Rayleigh`, the name of a file
+MatrixOrForm = Annotated[
+    Any, Rule("a matrix or what stands for one", lambda given: isinstance(given, _FORMS) or array_like(given))
+]
 
 
 @checked
@@ -47,13 +53,13 @@ class Structure:
     are. Raises `InputError` for matrices that are no such, of other sizes, asymmetric, and for maps of another length.
     """
 
-    mass: Any
-    stiffness: Any
-    damping: Any = None
+    mass: Matrix
+    stiffness: Matrix
+    damping: MatrixOrForm = None
     dofs: DofMap | None = None
     mesh: Mesh | None = None
     name: str = ""
-    structural: Any = None
+    structural: MatrixOrForm = None
 
     def __post_init__(self) -> None:
         labels: Any = self.dofs
@@ -152,7 +158,7 @@ class Structure:
         return of_node or self._labels().places(item)
 
     # --------------------------------------------------------------------------------------------------------- motion
-    def with_damping(self, damping: Any) -> Structure:
+    def with_damping(self, damping: MatrixOrForm) -> Structure:
         """The structure with another damping: a matrix (n, n), `Rayleigh`, `ModalDamping`, or None."""
         return replace(self, damping=damping)
 
@@ -170,9 +176,9 @@ class Structure:
         elements: Iterable[BaseElement] = (),
         loads: Iterable[Load] = (),
         parameters: Mapping[str, float] | None = None,
-        damping: Any = None,
+        damping: MatrixOrForm = None,
         name: str = "",
-        structural: Any = None,
+        structural: MatrixOrForm = None,
         units: str | None = None,
         angles: Any = (),
     ) -> System:

@@ -23,7 +23,7 @@ import numpy as np
 
 from suboctave.analysis.options import SearchOptions
 from suboctave.analysis.track import track
-from suboctave.arguments import checked
+from suboctave.arguments import Count, Positive, Progress, checked
 from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.continuation.problem import Array
 from suboctave.curves.identity import lies_on
@@ -56,9 +56,9 @@ def isola_map(
     *,
     probes: int | Sequence[float] = 3,
     max_step: float | None = None,
-    workers: int | None = 1,
-    progress: Any = None,
-    seconds: float | None = None,
+    workers: Count | None = 1,
+    progress: Progress = None,
+    seconds: Positive | None = None,
 ) -> IsolaMap:
     """Where in two design parameters an isola exists: its birth and its merging followed in a second parameter.
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from suboctave.analysis.locate_extremum import locate_extremum
 from suboctave.analysis.sensitivity import foretold, sensitivity
-from suboctave.arguments import checked
+from suboctave.arguments import Positive, checked
 from suboctave.bifurcation.bifurcation import TrackedEvent
 from suboctave.continuation.linear import length
 from suboctave.errors import ConvergenceError, InputError, is_number, shortened, suggest
@@ -78,7 +78,7 @@ def design_margin(
     at: float | None = None,
     scales: Mapping[str, float] | None = None,
     end: str = "born",
-    seconds: float | None = None,
+    seconds: Positive | None = None,
 ) -> DesignMargin:
     """The smallest change of parameters, measured by scales, with which an isola is gone.
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 
 from suboctave.analysis.options import SearchOptions
-from suboctave.arguments import checked
+from suboctave.arguments import Positive, Progress, checked
 from suboctave.bifurcation.bifurcation import TrackedEvent
 from suboctave.continuation.ending import Ending, EndReason
 from suboctave.curves.junction import period_name
@@ -154,7 +154,7 @@ class Isola:
         return self.range[0] <= value <= self.range[1]
 
     @limited
-    def at(self, value: float, *, progress: Any = None, seconds: float | None = None) -> Branch:
+    def at(self, value: float, *, progress: Progress = None, seconds: Positive | None = None) -> Branch:
         """The closed branch at a value of the parameter, over omega.
 
         `seconds`: time limit, after which what was computed is given and not kept in `known`, as after Ctrl-C.
@@ -311,7 +311,7 @@ class Isolas(Stored, Pictured, Sequence[Isola]):
         return self._items[which]
 
     @limited
-    def at(self, value: float, *, seconds: float | None = None) -> list[Branch]:
+    def at(self, value: float, *, seconds: Positive | None = None) -> list[Branch]:
         """The closed branches that exist at a value of the parameter; `seconds`: time limit of all of them."""
         branches: list[Branch] = []
         for isola in self:

@@ -23,7 +23,7 @@ import numpy as np
 
 from suboctave.analysis.branches import continue_branch
 from suboctave.analysis.options import SearchOptions
-from suboctave.analysis.subharmonics import Seeds, check_seeds
+from suboctave.analysis.subharmonics import Seeds
 from suboctave.curves.identity import lies_on
 from suboctave.curves.junction import period_name
 from suboctave.curves.starts import Harmonics
@@ -109,7 +109,7 @@ def find_isolas(
         search_at = np.linspace(*catalogue.bounds, search_at).tolist()
     check_count("depth", depth, 0)
     processes = check_workers(workers)
-    other_levels, fine = checked_levels(levels), check_seeds(seeds)
+    other_levels, fine = checked_levels(levels), seeds
     orders = None if search is None else checked_orders(search, 2)
     state = Search(catalogue, sorted(set(search_at)), orders or ())
     with catalogue.reporting(options.get("progress"), f"isolas over {parameter}"):

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from suboctave.analysis.subharmonics import periodic_orbit
-from suboctave.arguments import checked
+from suboctave.arguments import Count, Index, Positive, Progress, checked
 from suboctave.continuation.linear import one_thread
 from suboctave.continuation.problem import Array
 from suboctave.curves.identity import apart
@@ -164,13 +164,13 @@ class RegimeMap(PlaneMap):
     @limited
     def check(
         self,
-        points: int = 200,
-        seed: int = 0,
+        points: Count = 200,
+        seed: Index = 0,
         *,
-        states: int = 4,
-        transient: int = 400,
-        progress: Any = None,
-        seconds: float | None = None,
+        states: Count = 4,
+        transient: Index = 400,
+        progress: Progress = None,
+        seconds: Positive | None = None,
     ) -> RegimeCheck:
         """Integrate in time at points of the plane drawn at random, and compare what is reached with the labels.
 

@@ -24,7 +24,7 @@ import numpy as np
 from suboctave.analysis.branches import continue_branch, frequency_response
 from suboctave.analysis.diagram import Followed, grown_from
 from suboctave.analysis.options import SearchOptions
-from suboctave.analysis.subharmonics import Seeds, check_seeds
+from suboctave.analysis.subharmonics import Seeds
 from suboctave.bifurcation.bifurcation import Bifurcation, TrackedEvent
 from suboctave.curves.identity import lies_on, mirrored
 from suboctave.curves.junction import period_name
@@ -129,7 +129,7 @@ def regime_map(
     if not is_number(resolution) or not 0.0 < resolution < 0.5:
         raise InputError(f"resolution must be a share of the range between 0 and 0.5, not {resolution!r}")
     followed = _checked_isolas(isolas, parameter)
-    orders, fine, given = checked_orders(search, 1), check_seeds(seeds), _checked_motions(motions, catalogue)
+    orders, fine, given = checked_orders(search, 1), seeds, _checked_motions(motions, catalogue)
     places = [catalogue.bounds[0] + (i + 0.5) / values * catalogue.span for i in range(values)]
     processes = check_workers(workers)
     plan = _Survey(catalogue, 2**depth, resolution, max_slices, processes)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from suboctave.arguments import checked
+from suboctave.arguments import Positive, checked
 from suboctave.errors import InputError, check_numbers, shortened
 from suboctave.model.elements.base import STEP, Array, BaseElement, Element, central_difference, shifted, step_of
 from suboctave.model.elements.coupled import as_coupled
@@ -29,7 +29,7 @@ class DerivativeReport:
     """
 
     element: str
-    rtol: float
+    rtol: Positive
     errors: Mapping[str, float]
     messages: tuple[str, ...] = field(default=())
 
@@ -58,7 +58,7 @@ def check_derivatives(
     parameters: Mapping[str, float] | None = None,
     u: ArrayLike | None = None,
     v: ArrayLike | None = None,
-    rtol: float = 1e-6,
+    rtol: Positive = 1e-6,
 ) -> DerivativeReport:
     """Compare every derivative that an element provides with central differences of fourth order.
 

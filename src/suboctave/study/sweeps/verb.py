@@ -13,8 +13,9 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
-from typing import Annotated, Any, Unpack
+from typing import Annotated, Any, TypeAlias, Unpack
 
+from suboctave.arguments import READ, Count, Index
 from suboctave.atomic import free_place
 from suboctave.errors import InputError, path_of, shortened
 from suboctave.interruption import Interruption, TimeLimitReached
@@ -41,21 +42,21 @@ _SUFFIX = ".journal"
 class SweepOptions(RunOptions, total=False):
     """Options of `sweep`."""
 
-    draws: Annotated[int | None, "How many points are drawn from the distributions."]
+    draws: Annotated[Count | None, "How many points are drawn from the distributions."]
     seed: Annotated[int | None, "From which they are drawn (0)."]
     sampling: Annotated[str | None, 'How they are drawn: "random" (default), "latin hypercube" or "sobol".']
     measure: Annotated[
         Measure | None,
         "A function that is given the `Results` of each point at which nothing failed and gives `{name: number}`.",
     ]
-    listed: Annotated[int | None, "How many bifurcations of a kind, isolas or rows are listed (4); all are counted."]
+    listed: Annotated[Index | None, "How many bifurcations of a kind, isolas or rows are listed (4); all are counted."]
     path: Annotated[
         str | Path | None,
         "Where the result is saved (.nc). Beside it a journal keeps each point as it is computed, until all are.",
     ]
     overwrite: Annotated[bool | None, "Replace what is there."]
     resume: Annotated[bool | None, "Go on with what an interrupted or killed sweep left at `path`."]
-    workers: Annotated[int | None, "Processes, each on one core; default as many as there are cores."]
+    workers: Annotated[Count | None, "Processes, each on one core; default as many as there are cores."]
     scheduler: Annotated[
         str | None,
         'Address of a Dask scheduler whose workers compute instead, "tcp://host:8786" (extra `cluster`).',
@@ -63,11 +64,15 @@ class SweepOptions(RunOptions, total=False):
     allow_code: Annotated[bool | None, "Import and call the Python code that the study file names."]
 
 
+#: read by `plan_of`, which takes a pandas table too
+Swept: TypeAlias = Annotated[Mapping[str, Any] | Sequence[Mapping[str, float]] | None, READ]
+
+
 @with_options(SweepOptions)
 @timed
 def sweep(
     study: str | Path | Study,
-    parameters: Mapping[str, Any] | Sequence[Mapping[str, float]] | None = None,
+    parameters: Swept = None,
     **options: Unpack[SweepOptions],
 ) -> Sweep:
     """Run a study at many values of its parameters: a grid, a list of points, or draws from distributions.
