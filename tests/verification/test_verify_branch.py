@@ -106,7 +106,7 @@ def test_a_misplaced_bifurcation_is_not_confirmed(duffing_curve):
     item = duffing_curve.bifurcations["LP"][0]
     orbit = duffing_curve.orbits[20]
     wrong = Branch(
-        duffing_curve.system, "omega", list(duffing_curve.points), [replace(item, orbit=orbit)], [], False, "",
+        duffing_curve.system, "omega", list(duffing_curve.points), [replace(item, orbit=orbit)], [], False, (),
         duffing_curve.observe, {},
     )  # fmt: skip
     (found,) = so.verify(wrong, points=[0]).bifurcations
@@ -193,7 +193,7 @@ def test_interrupted(duffing_curve):
     [
         ({"points": 0}, "positive number of points"),
         ({"points": [10**6]}, "indices of a branch"),
-        ({"points": "all"}, "indices of a branch"),
+        ({"points": "all"}, "points must be a whole number or a list of whole numbers, not 'all'"),
         ({"every": 0}, "every must be"),
         ({"points": 3, "every": 2}, "not both"),
         ({"tolerance": 2.0}, "between 0 and 1"),

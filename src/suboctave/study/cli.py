@@ -231,9 +231,7 @@ def _run(
         by_user = outcome.interruption == Interruption()
         status, how = (INTERRUPTED, "Go on") if by_user else (FAILED, "Give more seconds, and go on")
         why = f"{outcome.interruption}; what was computed is kept"
-        again = ["suboctave", "run", str(study), *([] if out is None else ["--out", str(out)])]
-        again += ["--allow-code"] if read.allow_code else []
-        screen.print(f"{why}. {how}: {shlex.join(again)} --resume", soft_wrap=True)
+        screen.print(f"{why}. {how}: {_again(study, out, read.allow_code)}", soft_wrap=True)
     elif outcome.failed:
         status = WRONG if any(item.wrong_input for item in outcome.failed) else FAILED
         failed = ", ".join(item.step.name for item in outcome.failed)
@@ -249,6 +247,12 @@ def _run(
         _answered(json_wanted, state | {"analyses": analyses, "files": outcome.files, "left": outcome.left})
     if status:
         raise typer.Exit(status)
+
+
+def _again(study: Path, out: Path | None, allow_code: bool) -> str:
+    """The command that goes on with a run."""
+    words = ["suboctave", "run", str(study), *([] if out is None else ["--out", str(out)])]
+    return shlex.join([*words, *["--allow-code"] * allow_code, "--resume"])
 
 
 _Grid = Annotated[

@@ -60,7 +60,7 @@ class Place:
             return
         asked: Any = dof
         several = isinstance(asked, Sequence | np.ndarray) and not isinstance(asked, str | bytes)
-        given = tuple(asked) if several and np.ndim(asked) else (asked,)
+        given = tuple(asked) if several and getattr(asked, "ndim", True) else (asked,)
         with located("dof"):
             if len(given) not in (1, 2) or any(isinstance(e, bool) or not isinstance(e, Integral) for e in given):
                 named = any(isinstance(entry, str) for entry in given)
