@@ -1,9 +1,8 @@
-"""Following a curve: of whatever kind, until it ends; responses with their located bifurcations and events."""
+"""Following a response curve until it ends, with its located bifurcations and events."""
 
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
 from bisect import insort
 from collections.abc import Callable
 from contextlib import suppress
@@ -21,6 +20,7 @@ from suboctave.continuation.newton import NewtonOptions
 from suboctave.continuation.point import point_ahead, point_between, solved_again
 from suboctave.continuation.problem import Curve
 from suboctave.curves.corners import beyond_corner
+from suboctave.curves.driver import Driver
 from suboctave.curves.events.grazings import locate_grazings
 from suboctave.curves.events.layer import behind_their_grazings
 from suboctave.curves.events.monitors import (
@@ -34,7 +34,7 @@ from suboctave.curves.events.monitors import (
     solved_by,
 )
 from suboctave.curves.guard import Crossing, GuardedStep, StepGuard
-from suboctave.curves.identity import drop_seam, same_event
+from suboctave.curves.identity import same_event
 from suboctave.curves.junction import UNSEEN, Meeting, lost, meeting, passes_doubling, plain_point, regular_point
 from suboctave.curves.leaving import multiple_at
 from suboctave.curves.ledgers import REASON, CountCheck, DoublingWatch, HiddenDoublings, pair_in
@@ -42,9 +42,9 @@ from suboctave.curves.motion import CRITICAL, MotionEvaluation, MotionProblem
 from suboctave.curves.refine import bifurcation_at, solved_bifurcation, solved_in, turns_at
 from suboctave.curves.sample import Sample
 from suboctave.curves.trace import Settings, Trace, joined
-from suboctave.errors import ConvergenceError, NotFiniteError
+from suboctave.errors import ConvergenceError
 from suboctave.harmonic.truncation import next_harmonics
-from suboctave.interruption import Interruption, stopping, users_function
+from suboctave.interruption import stopping, users_function
 
 #: growth of motions of every size at one value of the parameter after which they may grow for ever: of a piece that a
 #: branch begins with, and of others
@@ -52,61 +52,6 @@ _GROWN = 1e12, 1e4
 #: speed of the free parameter along a curve, in scaled arclength, at which it turns; how far from there a curve begins
 #: that is followed both ways
 _TURNS, _BESIDE = 1e-2, 3e-3
-
-
-class Driver(ABC):
-    """Follows a curve in one direction; KeyboardInterrupt ends it politely."""
-
-    march: March
-
-    def __init__(self, settings: Settings) -> None:
-        self.settings = settings
-        self.trace = Trace()
-        #: the last sample taken in
-        self.previous: Sample | None = None
-
-    @abstractmethod
-    def _walk(self) -> None:
-        """Take in points until the curve ends."""
-
-    @abstractmethod
-    def _finish(self) -> None:
-        """Complete the trace of a curve that has come to an end or was interrupted."""
-
-    def _interrupted(self) -> None:  # noqa: B027 - nothing as a rule
-        """Drop what belongs to the step that was under way."""
-
-    def run(self) -> Trace:
-        """What following the curve gives."""
-        trace = self.trace
-        if self.settings.report is not None:
-            self.settings.report.begins()
-        try:
-            self._walk()
-        except KeyboardInterrupt as cause:
-            self._interrupted()
-            where = self.previous.where if self.previous else "the start"
-            trace.ends(Ending.stopped(Interruption.of(cause), where))
-        except ConvergenceError as failure:
-            if self.previous is None:
-                raise
-            self._interrupted()
-            reason = EndReason.NOT_FINITE if isinstance(failure, NotFiniteError) else EndReason.FAILED
-            trace.ends(Ending(reason, self.previous.where, str(failure)))
-        self._finish()
-        if trace.closed:
-            drop_seam(trace.bifurcations)
-            drop_seam(trace.events)
-        return trace
-
-    def _report(self, point: CurvePoint) -> None:
-        if self.settings.report is None:
-            return
-        curve, trace = point.curve, self.trace
-        assert isinstance(curve, MotionProblem)
-        basis, located = curve.balance.basis, sum(b.kind not in CONTACT_KINDS for b in trace.bifurcations)
-        numbers = len(trace.points), located, basis.harmonics // basis.nu
-        self.settings.report.at(point.parameter, curve.where(point.u), *numbers)
 
 
 _NOT_FOUND = {

@@ -193,25 +193,7 @@ def start_point(
     if given is not None:
         if isinstance(given, PeriodicOrbit) and curve.adaptive is not None and given.basis.nu == curve.balance.basis.nu:
             curve = curve.with_basis(given.basis)
-        guess = _from_given(curve, value, given)
-        try:
-            return settled(curve, guess, newton)
-        except ConvergenceError:
-            if isinstance(given, PeriodicOrbit):
-                # at a limit point the equations are singular at a fixed parameter: the nearest point of the curve
-                nearest = None
-                with suppress(ConvergenceError):
-                    nearest = settled(curve, guess, newton, null_row)
-                if nearest is not None:
-                    low, high = sorted(reach or (value, value))
-                    slack = _THERE * max(abs(low), abs(high))
-                    if low - slack <= nearest.parameter <= high + slack:
-                        return nearest
-                    failure = ConvergenceError(
-                        f"the nearest one lies at {curve.where(nearest.u)}; begin the range there, or start from "
-                        "another"
-                    )
-            raise ConvergenceError(f"no motion found from the given start at {curve.where(guess)}: {failure}") from None
+        return _beside_given(curve, value, given, newton, reach)
     patient = replace(newton, iterations=max(newton.iterations, 40), damped=True)
     ways: list[tuple[str, Callable[[], tuple[MotionProblem, Array]]]] = []
     for finer in _with_more_harmonics(curve):
@@ -249,6 +231,28 @@ def start_point(
         f"no motion found to start from at {where}{loose or ''}. Tried: " + "; ".join(tried) + ". "
         "Start elsewhere in the range, or give start= (an orbit, or a state near the motion)"
     )
+
+
+def _beside_given(
+    curve: MotionProblem, value: float, given: Any, newton: NewtonOptions, reach: tuple[float, float] | None
+) -> CurvePoint:
+    """The curve's point beside a given motion, as `start_point`."""
+    guess, hint = _from_given(curve, value, given), ""
+    try:
+        return settled(curve, guess, newton)
+    except ConvergenceError as error:
+        failure = error
+    if isinstance(given, PeriodicOrbit):
+        # at a limit point the equations are singular at a fixed parameter: the nearest point of the curve
+        with suppress(ConvergenceError):
+            nearest = settled(curve, guess, newton, null_row)
+            low, high = sorted(reach or (value, value))
+            slack = _THERE * max(abs(low), abs(high))
+            if low - slack <= nearest.parameter <= high + slack:
+                return nearest
+            where = curve.where(nearest.u)
+            hint = f"the nearest one lies at {where}; begin the range there, or start from another"
+    raise ConvergenceError(f"no motion found from the given start at {curve.where(guess)}: {hint or failure}")
 
 
 def linear_up_to(rest: BalanceState, change: Array, allowed: float) -> tuple[float, float]:

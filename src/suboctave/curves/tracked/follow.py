@@ -12,7 +12,7 @@ from suboctave.continuation.ending import Ending, EndReason
 from suboctave.continuation.linear import cosine, distance, length
 from suboctave.continuation.point import solved_again
 from suboctave.curves.corners import beyond_corner, grazes
-from suboctave.curves.follow import Driver
+from suboctave.curves.driver import Driver
 from suboctave.curves.junction import keeps_subharmonics
 from suboctave.curves.measures import bounded
 from suboctave.curves.motion import CRITICAL_EVERY, MotionProblem
