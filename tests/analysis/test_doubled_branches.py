@@ -165,7 +165,7 @@ def test_a_branch_arrives_at_a_doubling_right_beside_a_grazing(stiffness, first,
     assert not there.bifurcations["BP"]
     same_curve(there, back)
     # what is close to the parent's doubling by shooting
-    assert np.abs(so.verify(there.orbits[-1]).solution.multipliers - 1.0).min() < 0.02
+    assert np.abs(so.verify(there.orbits[-1]).solution.multipliers - 1.0).min() < 0.05
 
 
 @pytest.fixture(scope="module")
