@@ -12,7 +12,7 @@ from suboctave.bifurcation.bordered import branching_equation
 from suboctave.continuation import NewtonOptions
 from suboctave.continuation.linear import distance, length
 from suboctave.continuation.point import solved_again
-from suboctave.curves.events.beyond import lacks_harmonics, resolved
+from suboctave.curves.events.beyond import lacks_harmonics, resolved, zero_beside
 from suboctave.curves.events.layer import (
     behind_grazing,
     grazing_beside,
@@ -26,8 +26,16 @@ from suboctave.curves.interior import FINEST, contacts_between
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.sample import Sample
 from suboctave.errors import ConvergenceError
+from suboctave.harmonic.basis import HarmonicBasis
+from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.orbit import PeriodicOrbit
-from suboctave.harmonic.truncation import beyond_usual, choose_harmonics, next_harmonics, truncation
+from suboctave.harmonic.truncation import (
+    AdaptiveHarmonics,
+    beyond_usual,
+    choose_harmonics,
+    next_harmonics,
+    truncation,
+)
 
 #: distance of a located bifurcation's critical multiplier from the unit circle up to which its harmonics suffice
 _CRITICAL = 1e-3
@@ -69,6 +77,9 @@ def bifurcation_at(located: Located, a: Sample, b: Sample, observe: int, warning
         # harmonics may move it beyond the ends of a short step, where it may also be another one
         solution = behind if own else _with_more_harmonics(located, a, b) or behind
     if solution is None:
+        seen = _seen_with_more(located, curve, observe, arclength, warnings)
+        if seen is not None:
+            return seen
         sample, width, beside = located.sample, located.width, grazing_beside(guess)
         why = "a law is rough there" if beside is None else f"{beside.label} grazes there"
         # the bracket of a grazing shows the excursion itself
@@ -112,6 +123,33 @@ def bifurcation_at(located: Located, a: Sample, b: Sample, observe: int, warning
     return replace(item, tangent=tuple(curve.with_balance(item.orbit.balance).transfer(tangent, curve).tolist()))
 
 
+def _seen_with_more(
+    located: Located, curve: MotionProblem, observe: int, arclength: float, warnings: list[str]
+) -> Bifurcation | None:
+    """A period doubling between motions with more harmonics that fewer have too far away: as a motion with more; None
+    if it is none.
+    """
+    sample, kind = located.sample, located.kind
+    if sample.finer is None or kind.name != "PD" or kind.multiplicity > 1:
+        return None
+    try:
+        found = zero_beside(kind, sample.finer, sample.floquet, -1.0)
+    except ConvergenceError:
+        found = None
+    if found is None:
+        return None
+    state, width = found.motion.state, found.width
+    residual = state.balanced.size / state.balanced.scale
+    orbit = PeriodicOrbit(
+        state.balance, state.x.copy(), state.omega, dict(state.values), residual, truncation(state), curve.adaptive
+    )
+    where = f"{curve.name} = {found.motion.parameter:.6g}"
+    why = "its system needs more harmonics than it is solved with"
+    warnings.append(f"{kind.name} near {where} could only be bracketed, to +- {width:.1e}: {why}")
+    known = orbit.amplitude(observe), curve.name
+    return Bifurcation(kind.name, orbit, found.floquet, orbit.residual, *known, uncertainty=width, arclength=arclength)
+
+
 def with_what_harmonics_move(
     located: Located, item: Bifurcation, a: Sample, b: Sample, warnings: list[str]
 ) -> Bifurcation | None:
@@ -131,7 +169,7 @@ def with_what_harmonics_move(
         finer = None
     if finer is None:
         return None
-    moved = abs(item.parameter(curve.name) - finer.parameter)
+    moved = abs(item.parameter(curve.name) - finer.motion.parameter)
     return replace(item, floquet=finer.floquet, uncertainty=max(item.uncertainty, _COVERED * moved))
 
 
@@ -215,7 +253,7 @@ def _with_more_harmonics(located: Located, a: Sample, b: Sample) -> Singular | N
     curve, state = located.sample.curve, located.sample.state
     beyond: Singular | None = None
     while curve.adaptive is not None:
-        basis = next_harmonics(state, curve.adaptive)
+        basis = _more_harmonics(state, curve.adaptive)
         if basis.size <= state.basis.size:
             break
         kind, sample = located.kind, located.sample
@@ -241,6 +279,12 @@ def _with_more_harmonics(located: Located, a: Sample, b: Sample) -> Singular | N
     return beyond if _within_reach(beyond, wide, a, b) else None
 
 
+def _more_harmonics(state: BalanceState, rule: AdaptiveHarmonics) -> HarmonicBasis:
+    """A basis with more harmonics for one bifurcation; the present one where there are the most."""
+    basis = next_harmonics(state, rule)
+    return basis if basis.size > state.basis.size else beyond_usual(state, rule, one=True)
+
+
 def _refined(
     kind: BifurcationKind,
     solution: Singular,
@@ -263,8 +307,7 @@ def _refined(
             if critical is None or np.abs(solution.floquet.multipliers - critical).min() <= _CRITICAL:
                 basis = beyond_usual(state, adaptive, one=True)
             else:
-                basis = next_harmonics(state, adaptive)
-                basis = basis if basis.size > state.basis.size else beyond_usual(state, adaptive, one=True)
+                basis = _more_harmonics(state, adaptive)
         if basis.size <= state.basis.size:
             break
         try:

@@ -35,10 +35,13 @@ _CLOSE = 1e-9
 
 
 class Resolved(NamedTuple):
-    """A bifurcation with more harmonics: value of the free parameter, multipliers."""
+    """A bifurcation with more harmonics: the motion, its multipliers, and by how much the error of the critical one
+    moves it in the free parameter.
+    """
 
-    parameter: float
+    motion: FinerMotion
     floquet: FloquetResult
+    width: float
 
 
 def lacks_harmonics(kind: BifurcationKind, solution: Singular, curve: MotionProblem) -> bool:
@@ -62,14 +65,26 @@ def resolved(kind: BifurcationKind, solution: Singular, curve: MotionProblem, ta
     ConvergenceError
         If there is no motion with more harmonics.
     """
-    critical, scalar = kind.critical(solution), _SCALARS[kind.name]
+    critical = kind.critical(solution)
     assert critical is not None
     found = resolved_beside(curve, solution.state, tangent, solution.floquet)
-    if found is None:
-        return None
-    motion, result = found
-    places, values = [0.0], [scalar(motion, result, critical)]
-    way = math.copysign(_FIRST, 1.0)
+    return None if found is None else zero_beside(kind, *found, critical)
+
+
+def zero_beside(
+    kind: BifurcationKind, motion: FinerMotion, result: FloquetResult, critical: complex
+) -> Resolved | None:
+    """The bifurcation on the curve with more harmonics, by secants from a motion of it with its multipliers; None if
+    there is none nearby. critical: the multiplier that lies on the unit circle there.
+
+    Raises
+    ------
+    ConvergenceError
+        If the curve with more harmonics cannot be followed.
+    """
+    scalar = _SCALARS[kind.name]
+    places, values, parameters = [0.0], [scalar(motion, result, critical)], [motion.parameter]
+    way = _FIRST
     for _ in range(_TRIED):
         if abs(way) > _FARTHEST:
             return None
@@ -77,12 +92,15 @@ def resolved(kind: BifurcationKind, solution: Singular, curve: MotionProblem, ta
         result = floquet_multipliers(motion.state)
         places.append(way)
         values.append(scalar(motion, result, critical))
+        parameters.append(motion.parameter)
         change = values[-1] - values[-2]
         if change == 0.0:
             return None
         step = -values[-1] * (places[-1] - places[-2]) / change
         if abs(step) <= max(_CLOSE, _SETTLED * abs(way)):
-            return Resolved(motion.parameter, result)
+            error = float(result.errors[np.abs(result.multipliers - critical).argmin()])
+            width = error * abs((parameters[-1] - parameters[-2]) / change)
+            return Resolved(motion, result, width)
         way += math.copysign(min(abs(step), _FARTHEST / 4.0), step)
     return None
 
