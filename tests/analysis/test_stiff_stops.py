@@ -83,3 +83,15 @@ def test_limit_points_of_a_stop_ten_thousand_times_as_stiff():
     for item in curve.bifurcations["LP"]:
         true = locate_by_shooting(item.orbit.system, "LP", item.orbit.start(), item.omega)
         assert abs(item.omega - true.omega) <= item.uncertainty + 1e-8
+
+
+@pytest.mark.slow
+def test_a_doubling_that_fewer_harmonics_have_far_away_is_seen_with_more():
+    """The multiplier moves by .003 a step there, the harmonics left out move it by more; shooting: .796420646."""
+    elements = [so.ElasticStop(0, 9762.25, -0.75255, side="left"), so.PolynomialSpring(0, coefficients={3: 0.863214})]
+    system = so.System(1.927499, 0.263598, 1.028465, elements, [so.HarmonicLoad(0, 0.460884)])
+    curve = so.frequency_response(system, (0.791, 0.801))
+    (item,) = curve.bifurcations
+    true = locate_by_shooting(system, "PD", item.orbit.start(), item.omega)
+    assert item.kind == "PD"
+    assert abs(item.omega - true.omega) <= item.uncertainty < 1e-3
