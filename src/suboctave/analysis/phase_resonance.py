@@ -14,7 +14,7 @@ import numpy as np
 
 from suboctave.analysis.branches import frequency_response
 from suboctave.analysis.options import TrackOptions, handed_on
-from suboctave.analysis.subharmonics import find_subharmonics
+from suboctave.analysis.subharmonics import Branches, find_subharmonics
 from suboctave.analysis.track import track
 from suboctave.curves.starts import Harmonics
 from suboctave.curves.trace import BranchPoint
@@ -80,7 +80,7 @@ def phase_resonance(
         raise InputError(f"the phase is that of a single load at omega: this system has {shown}")
     plain = handed_on(options)
     plain.pop("formulation", None)
-    given = (
+    given: Branch | Branches = (
         frequency_response(system, omega, harmonics, **plain)
         if nu == 1
         else find_subharmonics(system, omega, nu, harmonics, **plain)

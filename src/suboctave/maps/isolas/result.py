@@ -65,7 +65,7 @@ class IsolaEnd(TrackedEvent, float):
     def __eq__(self, other: object) -> bool:
         if isinstance(other, IsolaEnd):
             return self._place == other._place
-        return float.__eq__(self, other)  # type: ignore[operator]
+        return float.__eq__(self, other)
 
     def __ne__(self, other: object) -> bool:
         return not self == other

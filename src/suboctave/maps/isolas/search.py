@@ -327,7 +327,7 @@ class Search:
         isola.followed = {**other.followed, **isola.followed}
         isola.pieces = tuple(dict.fromkeys([*isola.pieces, *other.pieces]))
         isola.notes = tuple(dict.fromkeys([*isola.notes, *other.notes]))
-        self._held = [(isola if one is other else one, *held) for one, *held in self._held]  # type: ignore[misc]
+        self._held = [(isola if one is other else one, piece, a, b) for one, piece, a, b in self._held]
 
     def attach(self, loop: Loop) -> None:
         """A branch that is not detached: its limit points at that value are explained."""
@@ -447,8 +447,7 @@ class _Direction:
         met = own or events
         # half way to what comes next, of any kind, or to the bound
         ahead = next(self.search.critical(loop.branch.nu, value, self.upper), (self.bound, []))[0]
-        nearest = min if self.upper else max
-        behind = 0.5 * (value + nearest([ahead, *self._breaks(loop, value)]))
+        behind = 0.5 * (value + (min if self.upper else max)([ahead, *self._breaks(loop, value)]))
         lasting = [piece for piece in loop.pieces if piece.contains(behind)]
         centre = next((e for e in own if e.kind == "extremum" and e.isola != "isola_merging"), None)
         if not lasting and centre is not None:
