@@ -328,8 +328,7 @@ class GeneralLaw(LawAlong):
 
 def force_of(member: Member, q: Array, theta: Array) -> Array:
     """The force of an element at states, finite or not."""
-    with np.errstate(all="ignore"):
-        return np.asarray(as_coupled(member.element).tangent(q, theta, member.coefficients)[0], dtype=float)
+    return np.asarray(as_coupled(member.element).tangent(q, theta, member.coefficients)[0], dtype=float)
 
 
 def not_finite(member: Member, place: float) -> str:
