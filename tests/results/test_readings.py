@@ -216,7 +216,7 @@ def test_elements_are_chosen_by_index(rattling_curve):
         rattling_curve.impacts(0)
     with pytest.raises(InputError, match="out of range"):
         rattling_curve.peak_force(7)
-    with pytest.raises(InputError, match="must be an index"):
+    with pytest.raises(InputError, match="element must be a whole number, not 'stop'"):
         rattling_curve.peak_force("stop")
     with pytest.raises(InputError, match="out of range"):
         rattling_curve.reading("peak_force_7")

@@ -130,10 +130,10 @@ class Basins(TimeResult):
         places = []
         for name, value, grid in (("x", x, self.x), ("y", y, self.y)):
             step = (grid[-1] - grid[0]) / max(len(grid) - 1, 1) or 1.0
-            place = int(np.floor((value - grid[0]) / step + 0.5))
-            if not 0 <= place < len(grid):
+            place = (value - grid[0]) / step + 0.5
+            if not 0.0 <= place < len(grid):
                 raise InputError(f"{name}={value:g} lies outside of the box")
-            places.append(place)
+            places.append(int(place))
         label = int(self.labels[places[1], places[0]])
         return self.attractors[label] if label >= 0 else None
 

@@ -354,9 +354,9 @@ class TwoTrajectories:
         for name, given in (("steps_per_period", self.steps_per_period), ("tolerances", self.tolerances)):
             if not len(given):
                 raise InputError(f"{name} must be several numbers, one for each setting, not {shortened(given)}")
-        if isinstance(self.offset, tuple) and not self.offset:
+        if np.size(self.offset) == 0:
             raise InputError("offset must be a number or several of them, not none")
-        for offset in self.offset if isinstance(self.offset, tuple) else (self.offset,):
+        for offset in self.offsets:
             if offset >= 1.0:
                 raise InputError(f"offset={self.offset!r} must be positive, and far below the size of the motion")
         if self.saturation > 1.0:
@@ -365,7 +365,7 @@ class TwoTrajectories:
     @property
     def offsets(self) -> tuple[float, ...]:
         """All offsets."""
-        return self.offset if isinstance(self.offset, tuple) else (float(self.offset),)
+        return tuple(float(offset) for offset in np.atleast_1d(self.offset))
 
 
 @checked(result=True)

@@ -151,7 +151,7 @@ class ModeCurve(TrackedBranch):
         found = []
         for state, power in zip(states, powers, strict=True):
             k = harmonic * state.basis.nu
-            index = round(k)
+            index = round(k) if np.isfinite(k) else 0
             if abs(k - index) > 1e-9 or index < 1:
                 raise InputError(f"motions of {state.basis.nu} periods have no harmonic {harmonic:g}")
             along = _amplitudes(state)[index] @ direction if index <= state.basis.harmonics else 0.0

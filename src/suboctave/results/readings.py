@@ -402,7 +402,7 @@ def translation(n: int, direction: ArrayLike | None) -> Array:
     except (TypeError, ValueError, OverflowError):
         r = np.zeros(0)
     if r.shape != (n,) or not np.all(np.isfinite(r)) or not r.any():
-        raise InputError(f"direction must be a vector of {n} finite numbers, not all zero, not {given!r}")
+        raise InputError(f"direction must be a vector of {n} finite numbers, not all zero, not {shortened(given)}")
     return r
 
 

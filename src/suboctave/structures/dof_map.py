@@ -163,6 +163,8 @@ class DofMap:
     def without(self, dofs: Sequence[int]) -> DofMap:
         """The map of what is left when these degrees of freedom are fixed."""
         gone = set(dofs)
+        if wrong := [dof for dof in gone if not 0 <= dof < len(self.labels)]:
+            raise InputError(f"dofs: there is no degree of freedom {wrong[0]}, only 0 to {len(self.labels) - 1}")
         kept = [label for i, label in enumerate(self.labels) if i not in gone]
         return DofMap(kept, {self.labels[i] for i in gone} | self.fixed)
 

@@ -21,7 +21,7 @@ from suboctave.arguments import Count, Positive, Progress, Share, checked
 from suboctave.bifurcation.bifurcation import CONTACT_KINDS, Bifurcation
 from suboctave.continuation.linear import one_thread
 from suboctave.curves.trace import BranchPoint
-from suboctave.errors import ConvergenceError, InputError
+from suboctave.errors import ConvergenceError, InputError, shortened
 from suboctave.floquet.methods import StabilityMethod, method_of
 from suboctave.floquet.result import FloquetResult
 from suboctave.harmonic.orbit import PeriodicOrbit
@@ -133,7 +133,7 @@ def _chosen(count: int, points: int | Iterable[int] | None, every: int) -> list[
         listed = [count]
     for i in listed:
         if not -count <= i < count:
-            raise InputError(f"points={points!r}: give a number of points, or indices of a branch of {count}")
+            raise InputError(f"points={shortened(points)}: give a number of points, or indices of a branch of {count}")
     return sorted({i % count for i in listed})
 
 

@@ -58,7 +58,7 @@ class Callable(Element):
         required("Callable", function=function)
         for what, given in (("function", function), ("derivatives", derivatives)):
             if given is not None and not callable(given):
-                raise InputError(f"Callable: {what} must be a function of arrays, not {given!r}")
+                raise InputError(f"Callable: {what} must be a function of arrays, not {shortened(given)}")
         self.coefficient_names = tuple(coefficients or {})
         super().__init__(dof, list((coefficients or {}).values()), direction=direction)
         self.function: Function[..., Any] = function
