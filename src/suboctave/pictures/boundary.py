@@ -30,7 +30,7 @@ from suboctave.pictures import strokes, style
 from suboctave.pictures.drawing import Axis, Beads, Drawing, Entry, Frame, Label, Markers, Region, Surface, plain
 from suboctave.pictures.options import Coordinates, SpaceOptions, View
 from suboctave.pictures.paper import save_or_show
-from suboctave.pictures.strokes import add_strokes, checked, events_of, line_through, named_axis, seen_as
+from suboctave.pictures.strokes import Verdict, add_strokes, checked, events_of, line_through, named_axis, seen_as
 from suboctave.pictures.style import Mark, Pen, period_colour, period_name, period_of, places_among, tinted
 from suboctave.store.layout import coordinate
 
@@ -120,7 +120,7 @@ def boundary_drawing(
     pens = boundary_styles(group, names)
     limits = axes.limits(group, _MARGIN, _MARGIN)
     spread = (limits[0][1] - limits[0][0], limits[1][1] - limits[1][0])
-    frame, verdicts, hollow = Frame(), set[bool | None](), False
+    frame, verdicts, hollow = Frame(), set[Verdict](), False
     for region in shade(heads, axes.names, axes.factors):
         frame.add(region, region.name)
     earlier: dict[Pen, list[np.ndarray]] = {}
@@ -403,7 +403,7 @@ def _add_responses(
     Returns whether parts of them are unstable.
     """
     depths = [float(np.nanmean(axes.of(dataset)[0][1])) for dataset in responses]
-    verdicts = set[bool | None]()
+    verdicts = set[Verdict]()
     for index in np.argsort(depths, kind="stable")[::-1]:
         dataset = responses[index]
         pen, name = Pen(period_colour(period_of(dataset)), _THIN, style.UNSTABLE_DASH), called.get(id(dataset), "")
@@ -426,7 +426,7 @@ def _add_boundaries(
     floor: float,
 ) -> None:
     """Curves of bifurcations, as given and with the ends of isolas among their events, and their projections."""
-    within = set[bool | None]()
+    within = set[Verdict]()
     names = [plain(name) for name in boundary_names([dataset for dataset, _ in bounds])]
     pens = boundary_styles([dataset for dataset, _ in bounds], names)
     for (given, dataset), name, pen in zip(bounds, names, pens, strict=True):

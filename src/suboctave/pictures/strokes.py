@@ -239,12 +239,13 @@ def _spread(arc: np.ndarray, scale: np.ndarray) -> np.ndarray:
 
 # --------------------------------------------------------------------------------------------------- parts of a drawing
 #: role, name and group of a stroke by its verdict
-Seen: TypeAlias = "Mapping[bool | None, tuple[str, str, str]]"
+Seen: TypeAlias = "Mapping[Verdict, tuple[str, str, str]]"
 
 
 def seen_as(role: str, name: str) -> Seen:
     """All strokes of a curve alike."""
-    return dict.fromkeys((None, True, False, OPEN), (role, name, name))
+    verdicts: tuple[Verdict, ...] = (None, True, False, OPEN)
+    return dict.fromkeys(verdicts, (role, name, name))
 
 
 def checked(curves: Sequence[Any]) -> list[xarray.Dataset]:
