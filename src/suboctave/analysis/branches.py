@@ -31,6 +31,7 @@ from suboctave.curves.junction import (
     beside,
     between_values,
     curvature_of,
+    doubling_curvature,
     emanating,
     leaving_doubling,
     period_name,
@@ -478,7 +479,10 @@ def _closest(item: Bifurcation, curve: MotionProblem, u: Array, direction: Array
     leads = None
     if item.kind == "PD":
         assert isinstance(curve, DoubledMotions)
-        close = leaving_doubling(curve, u, direction, expected, settings.newton)
+        state = item.orbit.state()
+        vectors = item.null_vectors or null_vectors(state, Kind.HALF)
+        leads = doubling_curvature(Singular(state, vectors, 0.0, item.residual, 0), curve.name)
+        close = leaving_doubling(curve, u, direction, expected, settings.newton, leads)
     else:
         leads = curvature_of(item.normal_form)
         close = beside(curve, u, direction / length(weights * direction), weights, expected, settings.newton, leads)

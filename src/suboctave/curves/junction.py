@@ -19,7 +19,7 @@ import numpy as np
 
 from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.bifurcation.bordered import doubled_direction, null_vectors
-from suboctave.bifurcation.normal_form import NormalForm
+from suboctave.bifurcation.normal_form import NormalForm, normal_form
 from suboctave.continuation.ending import Ending, EndReason
 from suboctave.continuation.linear import distance, length
 from suboctave.continuation.march import Arrival
@@ -303,7 +303,8 @@ def _last_before(
     assert isinstance(curve, BlownUp)
     # over twice the period
     multipliers = doubling.floquet.multipliers**2
-    close = beside_doubling(curve, landed.u, landed.weights, multipliers, newton, 0.7 * float(a.u[-2]))
+    leads = doubling_curvature(doubling, curve.motions.name)
+    close = beside_doubling(curve, landed.u, landed.weights, multipliers, newton, leads, 0.7 * float(a.u[-2]))
     return (None, False) if close is None else (close.point.turned, close.smooth)
 
 
@@ -313,6 +314,7 @@ def leaving_doubling(
     direction: Array,
     multipliers: ComplexArray,
     newton: NewtonOptions,
+    curvature: float | None,
 ) -> Beside | None:
     """The first point of the branch that leaves a period doubling, as `beside`.
 
@@ -325,18 +327,35 @@ def leaving_doubling(
     weights = blown_up.weights(start, 0.0)
     with suppress(ConvergenceError):
         start = correct(blown_up, start, blown_up.size_of_odd, weights, newton).u
-    return beside_doubling(blown_up, start, weights, multipliers, newton)
+    return beside_doubling(blown_up, start, weights, multipliers, newton, curvature)
+
+
+def doubling_curvature(doubling: Singular, name: str) -> float | None:
+    """Which way the parameter goes on the branch that leaves a period doubling, also where its stability is open; None
+    where there is no normal form.
+    """
+    assert doubling.vectors is not None
+    with suppress(ConvergenceError):
+        return normal_form("PD", doubling.state, doubling.vectors, name).coefficients.get("curvature")
+    return None
 
 
 def beside_doubling(
-    curve: BlownUp, u: Array, weights: Array, multipliers: ComplexArray, newton: NewtonOptions, most: float = np.inf
+    curve: BlownUp,
+    u: Array,
+    weights: Array,
+    multipliers: ComplexArray,
+    newton: NewtonOptions,
+    curvature: float | None,
+    most: float = np.inf,
 ) -> Beside | None:
     """The point of a branch right beside the period doubling at u that it leaves, headed away; None if there is none.
 
     With the size eps of the odd part the parameter moves like `c eps^2`, and multipliers leave those of the doubling.
     The odd part is divided until this is so: where it is not something else happens on the way.
 
-    `multipliers` of the parent's motion over the period of the curve's; `most`: the largest odd part.
+    `multipliers` of the parent's motion over the period of the curve's; `curvature`: the sign of c, where a normal form
+    tells it; `most`: the largest odd part.
     """
     at, along = curve.size_of_odd, np.zeros(len(u))
     along[at] = 1.0 / weights[at]
@@ -358,7 +377,9 @@ def beside_doubling(
         points.append((point, 0.0 if abs(moved) <= _STILL else moved / tried**2))
         if len(points) > 1:
             (before, one), (_, other) = points[-2:]
-            if _near(before, multipliers) and abs(one - other) <= _BENT * abs(other):
+            # at a doubling right beside a grazing it may do so on both sides of a turn
+            foretold = curvature is None or curvature * other >= 0.0
+            if foretold and _near(before, multipliers) and abs(one - other) <= _BENT * abs(other):
                 return Beside(before, True)
     return Beside(points[-1][0], False) if points else None
 
