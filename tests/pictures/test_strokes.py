@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+import suboctave as so
 from suboctave.errors import InputError
-from suboctave.pictures.strokes import bent, cut, line, without_repeats
+from suboctave.pictures.strokes import OPEN, bent, cut, line, without_repeats
 from suboctave.store.layout import UNKNOWN, EventRow, curve_dataset
 
 X = np.arange(5.0)
@@ -163,3 +164,15 @@ def test_few_vertices_and_unknown_values_are_drawn_as_they_are():
     one, other = bent(same, same, (1.0, 1.0))
     assert one == pytest.approx(0.5)
     assert other == pytest.approx(0.5)
+
+
+def test_a_stretch_whose_multipliers_are_not_known_is_dotted():
+    """Neither solid nor dashed: an error as large as the multiplier is no verdict."""
+    curve = so.frequency_response(so.library.duffing(c=0.1, k=1.0, alpha=1.0, F=0.1), (0.5, 0.8), harmonics=5)
+    dataset = curve.to_xarray()
+    errors = dataset["multiplier_errors"].to_numpy().copy()
+    errors[3:6] = 2.0
+    dataset["multiplier_errors"] = (dataset["multiplier_errors"].dims, errors)
+    strokes = cut(dataset, line(dataset, "omega"))
+    assert [stroke.stable for stroke in strokes] == [True, OPEN, True]
+    assert strokes[1].point[[0, -1]].tolist() == [2, 6]

@@ -26,11 +26,9 @@ from suboctave.harmonic.evaluation import BalanceState, length
 
 #: most unknowns that adaptive selection goes to: beyond, the dense matrices cost more than the harmonics are worth
 _MOST_UNKNOWNS = 4000
-#: numbers of harmonics (of omega) that adaptive selection chooses from
-_LADDER = (
-    *(3, 5, 7, 9, 11, 13, 15, 19, 23, 27, 31, 39, 47, 55, 63, 79, 95, 111, 127),
-    *(159, 191, 223, 255, 319, 383, 447, 511),
-)
+#: numbers of harmonics (of omega) that adaptive selection chooses from; those that only a user asks for
+_HIGH = (319, 383, 447, 511)
+_LADDER = (3, 5, 7, 9, 11, 13, 15, 19, 23, 27, 31, 39, 47, 55, 63, 79, 95, 111, 127, 159, 191, 223, 255, *_HIGH)
 MOST_HARMONICS = _LADDER[-1]
 #: most harmonics of omega where nobody says how many
 _USUAL = 127

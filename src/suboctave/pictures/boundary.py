@@ -30,7 +30,7 @@ from suboctave.pictures import strokes, style
 from suboctave.pictures.drawing import Axis, Beads, Drawing, Entry, Frame, Label, Markers, Region, Surface, plain
 from suboctave.pictures.options import Coordinates, SpaceOptions, View
 from suboctave.pictures.paper import save_or_show
-from suboctave.pictures.strokes import Verdict, add_strokes, checked, events_of, line_through, named_axis, seen_as
+from suboctave.pictures.strokes import Seen, Verdict, add_strokes, checked, events_of, line_through, named_axis, seen_as
 from suboctave.pictures.style import Mark, Pen, period_colour, period_name, period_of, places_among, tinted
 from suboctave.store.layout import coordinate
 
@@ -125,7 +125,11 @@ def boundary_drawing(
         frame.add(region, region.name)
     earlier: dict[Pen, list[np.ndarray]] = {}
     for dataset, name, pen in zip(group, names, pens, strict=True):
-        seen = {None: ("curve", name, name), True: ("border", name, name), False: ("within", f"{name}, {WITHIN}", name)}
+        seen: Seen = {
+            None: ("curve", name, name),
+            True: ("border", name, name),
+            False: ("within", f"{name}, {WITHIN}", name),
+        }
         verdicts |= add_strokes(frame, dataset, axes, pen, seen, earlier=earlier, spread=spread)
         points, places = axes.of(dataset)
         whole = line_through(dataset, points, places)
@@ -249,7 +253,7 @@ def _small_mark(kind: str, pen: Pen, *, hollow: bool) -> Mark:
     return Mark(own.marker, SMALL * own.size, "white" if hollow else pen.colour, pen.colour)
 
 
-def verdict_entries(verdicts: set[bool | None], width: float = 1.0) -> dict[str, Entry]:
+def verdict_entries(verdicts: set[Verdict], width: float = 1.0) -> dict[str, Entry]:
     """What the legend says of strokes, where there are dashed ones."""
     pen, words = Pen(style.SOFT, width, style.UNSTABLE_DASH), {True: BORDER, False: WITHIN}
     return {words[s]: Entry(pen.along(s)) for s in words if s in verdicts} if False in verdicts else {}
