@@ -78,7 +78,7 @@ def find_subharmonics(
     seeds: Seeds | None = None,
     linear: LinearPart | None = None,
     **options: Unpack[CurveOptions],
-) -> list[Branch]:
+) -> Branches:
     """Branches of motions of `subharmonic` load periods in a range of frequencies, each once; empty if none is found.
 
     Isolated ones among them, which no sweep and no period doubling leads to. The search is one of resonances
