@@ -83,6 +83,8 @@ Count = Annotated[int, Rule("a positive whole number", lambda n: n >= 1), _FEW_E
 Index = Annotated[int, Rule("a whole number of at least 0", lambda n: n >= 0), _FEW_ENOUGH]
 #: what the callable makes a matrix of
 Matrix = Annotated[Any, Rule("a matrix of numbers", lambda value: array_like(value))]
+#: a text in which bytes that are no UTF-8 may be escaped, as in the names of files
+Title = Annotated[Any, Rule("a text", lambda value: isinstance(value, str))]
 Name = Annotated[str, Rule("a text that is not empty", bool)]
 Progress = Callable[[float, str], Any] | bool | None
 
@@ -241,7 +243,8 @@ class _Table:
         except Unfit as unfit:
             where = name + "".join(f"[{shortened(key)}]" for key in unfit.place)
             key = (name, *(part for part in unfit.place if isinstance(part, str | int)))
-            raise InputError(f"{where} must be {unfit.words}, not {shortened(unfit.value)}{unfit.hint}", key) from None
+            hint = f": give an object, {unfit.value.__name__}()" if isinstance(unfit.value, type) else unfit.hint
+            raise InputError(f"{where} must be {unfit.words}, not {shortened(unfit.value)}{hint}", key) from None
 
 
 def _namespace(function: Callable[..., Any], owner: type | None, name: str) -> Mapping[str, Any]:

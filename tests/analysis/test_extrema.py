@@ -174,11 +174,11 @@ def test_wrong_input_is_refused(folds):
         ("cc", (0.0, 1.0), "unknown parameter 'cc'"),
         (("q", "c"), (0.0, 1.0), "followed in one more parameter"),
         ("c", (0.2, 0.3), "the bifurcation has c=0.05, outside"),
-        ("c", 1.0, "give two numbers"),
+        ("c", 1.0, "bounds must be a list, not 1"),
     ):
         with pytest.raises(so.InputError, match=message):
             so.track(extremum, parameter, bounds)
-    with pytest.raises(so.InputError, match=r"starts from one of the \.extrema"):
+    with pytest.raises(so.InputError, match=r"extremum must be a TrackedEvent"):
         so.locate_extremum(folds[0])
     with pytest.raises(so.InputError, match="unknown formulation 'alcorta'"):
         so.locate_extremum(extremum, formulation="alcorta")

@@ -131,7 +131,7 @@ def test_options_last(tmp_path):
         ("extendet", "did you mean 'extended'"),
         ("alcorta", "did you mean 'alcorta2019'"),
         (so.Alcorta2019, "give an object"),
-        (3, "a formulation is"),
+        (3, "must be a Formulation or a text"),
     ],
 )
 def test_wrong_formulations_are_refused(given, words):

@@ -239,8 +239,10 @@ def test_a_time_limit_that_is_none_is_refused_before_anything_else(verb):
     given = inspect.signature(function).parameters
     assert given["seconds"].kind is inspect.Parameter.KEYWORD_ONLY
     needed = [p for p in given.values() if p.default is p.empty]
-    positional = [None for p in needed if p.kind is p.POSITIONAL_OR_KEYWORD]
-    named = {p.name: None for p in needed if p.kind is p.KEYWORD_ONLY}
+    sound = {"box": ((-1.0, 1.0), (-1.0, 1.0)), "parameter": "F", "values": (0.0, 1.0), "bounds": (0.5, 1.0)}
+    sound["omega"] = (0.5, 1.0) if verb in ("phase_resonance", "lyapunov_map") else 1.0
+    positional = [sound.get(p.name) for p in needed if p.kind is p.POSITIONAL_OR_KEYWORD]
+    named = {p.name: sound.get(p.name) for p in needed if p.kind is p.KEYWORD_ONLY}
     for wrong in (0.0, -3, float("nan"), "10"):
         with pytest.raises(so.InputError, match="seconds must be a positive number"):
             function(*positional, **named, seconds=wrong)

@@ -225,7 +225,7 @@ def test_wrong_use_is_refused(rubbing):
     found = so.equilibria(rubbing, "mu", (-0.1, 0.1))
     hopf = found.bifurcations["Hopf"][0]
     cycles = so.limit_cycles(hopf, max_step=0.1)
-    with pytest.raises(so.InputError, match="not at int"):
+    with pytest.raises(so.InputError, match="must be a Bifurcation, a BranchPoint or a PeriodicOrbit, not 3"):
         so.limit_cycles(3)
     with pytest.raises(so.InputError, match="name the parameter="):
         so.limit_cycles(cycles.points[0])

@@ -246,7 +246,7 @@ def test_mistakes(response, onto, message):
 
 
 def test_there_must_be_a_load_and_a_point(response):
-    with pytest.raises(InputError, match="point of a branch"):
+    with pytest.raises(InputError, match="must be a Bifurcation or a BranchPoint, not Branch"):
         so.track(response, "F", (0.01, 0.3), onto="phase_resonance")
     system = so.System(
         [[1.0]], [[0.1]], [[1.0]], loads=[so.HarmonicLoad(dof=0, amplitude="F", harmonic=2)], parameters={"F": 1.0}

@@ -96,7 +96,7 @@ def test_what_has_none_is_refused():
     branch = so.frequency_response(OSCILLATOR, (2.4, 1.6), harmonics=7)
     item = branch.bifurcations["PD"][0]
     for given, words in (
-        ((branch,), "located bifurcation"),
+        ((branch,), "bifurcation must be a Bifurcation, not Branch"),
         ((item, ["zetta"]), "did you mean 'zeta'"),
         ((item, ["omega"]), "omega is free"),
     ):

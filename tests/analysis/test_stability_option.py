@@ -91,7 +91,8 @@ def test_along_any_parameter(default):
 
 
 @pytest.mark.parametrize(
-    ("method", "message"), [("hil", "did you mean 'hill'"), (so.Hill, "give an object"), (1.0, "a stability method is")]
+    ("method", "message"),
+    [("hil", "did you mean 'hill'"), (so.Hill, "give an object"), (1.0, "must be a StabilityMethod or a text")],
 )
 def test_wrong_methods_are_refused_before_any_work(default, method, message):
     with pytest.raises(so.InputError, match=message):

@@ -286,7 +286,7 @@ def test_what_cannot_be_switched_at(weak):
         so.switch_branch(weak.bifurcations["LP"][0])
     with pytest.raises(InputError, match="does not split"):
         so.switch_branch(weak.grazings[0])
-    with pytest.raises(InputError, match=r"takes a Bifurcation, not Branch"):
+    with pytest.raises(InputError, match=r"must be a Bifurcation, not Branch"):
         so.switch_branch(weak)
     with pytest.raises(InputError, match=r"side must be"):
         so.switch_branch(weak.bifurcations["PD"][0], side=2)

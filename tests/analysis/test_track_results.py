@@ -112,7 +112,7 @@ def test_an_interrupted_curve_keeps_what_it_has(limit_point):
         ({"parameter": ("F", "c")}, "two ranges"),
         ({"parameter": ("F", "c"), "bounds": ((0.0, 1.0), (0.0, 1.0)), "omega": (1.0, 2.0)}, "leave omega= out"),
         ({"bounds": (0.2, 0.3)}, "the bifurcation has F=0.1, outside"),
-        ({"bounds": 3.0}, "give two numbers"),
+        ({"bounds": 3.0}, "bounds must be a list, not 3"),
         ({"bounds": (0.1, 0.1)}, "two different finite ends"),
         ({"omega": (3.0, 4.0)}, "the bifurcation has omega="),
         ({"omega": (-1.0, 4.0)}, "frequencies are positive"),
@@ -129,7 +129,7 @@ def test_wrong_input_is_refused(limit_point, arguments, message):
 def test_what_cannot_be_tracked(curve, limit_point):
     with pytest.raises(so.InputError, match="this is a CP"):
         so.track(curve.bifurcations["CP"][0], "F", (0.0, 0.2))
-    with pytest.raises(so.InputError, match="a located bifurcation, not PeriodicOrbit"):
+    with pytest.raises(so.InputError, match="must be a Bifurcation or a BranchPoint, not PeriodicOrbit"):
         so.track(limit_point.orbit, "F", (0.0, 0.2))
 
 

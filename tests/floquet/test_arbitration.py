@@ -47,7 +47,7 @@ def test_methods_by_object_and_by_name(doubling, at):
     [
         ("monodrony", "did you mean 'monodromy'"),
         (so.Hill, "give an object, Hill()"),
-        (3, "a stability method is"),
+        (3, "must be a StabilityMethod or a text"),
     ],
 )
 def test_wrong_methods_are_refused(doubling, method, message):

@@ -77,5 +77,5 @@ def test_what_has_no_margin_is_refused(isola):
     ):
         with pytest.raises(so.InputError, match=words):
             so.design_margin(isola, **arguments)
-    with pytest.raises(so.InputError, match="find_isolas"):
+    with pytest.raises(so.InputError, match="must be an Isola"):
         so.design_margin(0.5, ["p"])

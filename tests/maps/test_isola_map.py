@@ -101,7 +101,7 @@ def test_a_region_that_closes(isolas, tmp_path):
         ({"probes": -1}, "probes must be"),
         ({"probes": [20.0]}, "probes must be"),
         ({"isolas": []}, "what find_isolas gave"),
-        ({"isolas": 3}, "what find_isolas gave"),
+        ({"isolas": 3}, "must be an Isola"),
     ],
 )
 def test_what_is_refused(isolas, named, words):

@@ -19,7 +19,7 @@ from suboctave.curves.identity import lies_on, mirrored
 from suboctave.interruption import Interruption
 from suboctave.maps import catalogue
 from suboctave.maps.catalogue import Catalogue, SearchRange
-from suboctave.maps.isolas.result import IsolaEnd, Isolas
+from suboctave.maps.isolas.result import Isola, IsolaEnd, Isolas
 from suboctave.maps.isolas.search import Search
 
 OMEGA = (1.3, 4.5)
@@ -512,9 +512,12 @@ def test_what_hangs_on_an_isola_is_part_of_it():
 def test_isolas_are_in_the_order_of_their_births():
     """A birth at 0 is one."""
 
-    class Born:
+    class Born(Isola):
+        born, range = None, None
+
         def __init__(self, born, top):
-            self.born, self.range = born, (-1.0, top)
+            object.__setattr__(self, "born", born)
+            object.__setattr__(self, "range", (-1.0, top))
 
     given = [Born(0.5, 0.5), Born(None, 0.1), Born(0.0, 3.0), Born(-0.5, 1.0)]
     found = Isolas(given, hardening(), "F", (-1.0, 3.0), (0.5, 1.2))
@@ -542,7 +545,7 @@ def test_notes_of_searches_under_other_loads_are_kept(monkeypatch):
         ({"values": 1}, "at least 2"),
         ({"values": [0.5, 1.5]}, "from 0 to 1, not"),
         ({"search": (0,)}, "periods"),
-        ({"search": "2"}, "periods"),
+        ({"search": "2"}, "search must be a list of whole numbers"),
         ({"levels": (0.0,)}, "levels"),
         ({"levels": (2.0, 1.0)}, "other ones than 1"),
         ({"depth": -1}, "depth"),

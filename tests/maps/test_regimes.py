@@ -170,7 +170,7 @@ def test_isola_and_cascade_of_one_slice():
         ({"values": 0}, "values must be"),
         ({"resolution": 0.7}, "resolution must be"),
         ({"search": "3T"}, "search must be"),
-        ({"motions": [3]}, "motions must be"),
+        ({"motions": [3]}, "motions\\[0\\] must be a PeriodicOrbit"),
         ({"isolas": []}, "isolas must be"),
         ({"omega": (-1.0, 2.0)}, "positive"),
     ],

@@ -207,7 +207,7 @@ def test_part_of_the_axes_and_some_of_the_marks():
         (lambda: plot_space([response(0.2), response(0.2)]), "into the depth"),
         (lambda: plot_space([response(0.2), boundary()], x="q"), "no parameter 'q'"),
         (lambda: plot_space([response(0.2), boundary()], y="p"), "neither of omega, j"),
-        (lambda: plot_space([response(0.2), boundary()], elevation="high"), "angle in degrees"),
+        (lambda: plot_space([response(0.2), boundary()], elevation="high"), "elevation must be a finite number"),
     ],
 )
 def test_what_cannot_be_drawn_is_refused(call, message):

@@ -317,7 +317,7 @@ def test_what_is_no_motion_is_refused(swinging):
     ):
         with pytest.raises(InputError, match=message):
             so.plot_phase(item)
-    for points, message in (([99], "no point 99"), ([0.5], "whole numbers"), ([True], "whole numbers")):
+    for points, message in (([99], "no point 99"), ([0.5], "whole number"), ([True], "whole number")):
         with pytest.raises(InputError, match=message):
             so.plot_phase(swinging, points=points)
     with pytest.raises(InputError, match="drawn by plot_phase"):

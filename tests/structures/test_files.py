@@ -334,7 +334,7 @@ def test_what_is_missing_is_said(tmp_path, chain):
     write_npz(tmp_path, chain)
     with pytest.raises(so.InputError, match=r"there is no file .*s\.npy.*did you mean 's\.npz'"):
         so.read_structure(tmp_path / "s.npy")
-    with pytest.raises(so.InputError, match="a file is given by its name"):
+    with pytest.raises(so.InputError, match="path must be a text or a PathLike"):
         so.read_structure(3)
     (tmp_path / "empty.npz").touch()
     with pytest.raises(so.InputError, match=r"empty\.npz is empty"):

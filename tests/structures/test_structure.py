@@ -219,7 +219,7 @@ def test_frequencies_that_lie_too_close_are_no_endless_search(monkeypatch):
 
 @pytest.mark.parametrize("count", [0, -1, 1.5, "a", True])
 def test_a_count_of_frequencies_is_a_whole_number(structure, count):
-    with pytest.raises(so.InputError, match="how many natural frequencies"):
+    with pytest.raises(so.InputError, match="whole number"):
         structure.frequencies(count)
 
 
@@ -236,7 +236,7 @@ def test_rayleigh_from_ratios_has_these_ratios(structure, chain):
     "pairs", [((1, 0.1), (1, 0.1)), ((0, 0.1), (1, 0.1)), ((1, 0.1), (2, -1)), (1, 2), ((1,), (2,))]
 )
 def test_rayleigh_refuses_what_has_no_answer(pairs):
-    with pytest.raises(so.InputError, match="from_ratios"):
+    with pytest.raises(so.InputError, match="from_ratios|must be two finite numbers"):
         so.Rayleigh.from_ratios(*pairs)
 
 
@@ -478,7 +478,7 @@ EYE = np.eye(3)
         ({"stiffness": np.zeros((0, 0)), "mass": np.zeros((0, 0))}, "must be square"),
         ({"stiffness": np.ones(3)}, "must be a matrix of numbers, not of shape"),
         ({"stiffness": "K.npz"}, "must be a matrix of numbers"),
-        ({"stiffness": None}, "the stiffness is missing"),
+        ({"stiffness": None}, "stiffness must be a matrix of numbers, not None"),
         ({"stiffness": EYE * (1 + 0.1j)}, "the stiffness is complex: give its real part, and structural"),
         ({"stiffness": np.array([[1, 0, 0], [0, np.nan, 0], [0, 0, 1]])}, r"not finite: \[1, 1\] is nan"),
         (

@@ -108,7 +108,7 @@ class Sensitivity(Mapping[str, Mapping[str, float]]):
 
 
 @checked
-def sensitivity(bifurcation: Bifurcation, parameters: Sequence[str] | None = None) -> Sensitivity:
+def sensitivity(bifurcation: Bifurcation, parameters: str | Sequence[str] | None = None) -> Sensitivity:
     """Derivatives of where a bifurcation lies, and of its amplitude, by the parameters that were held.
 
     Parameters

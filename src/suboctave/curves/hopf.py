@@ -33,7 +33,7 @@ def hopf_beside(a: Sample, b: Sample) -> TrackedEvent:
     """The Hopf point in which limit cycles end between two neighbours; ConvergenceError if it is not found there."""
     curve, near = b.curve, min((a, b), key=lambda sample: length(oscillating(sample.state)))
     rate, name = near.state.rate, curve.name
-    guess = Guess(at_rest(near.state, BEYOND * rate), name, curve.span, rate)
+    guess = Guess(at_rest(near.state, BEYOND * rate), name, curve.span, rate, size=curve.unit(b.point.weights))
     found = locate_singular(guess, Kind.FREE)
     state = found.state
     moved = abs(guess.value(state) - guess.parameter) / curve.span, abs(found.kappa / rate - 1.0)

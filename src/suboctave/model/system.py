@@ -15,7 +15,7 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from suboctave.arguments import Rule, checked
+from suboctave.arguments import Rule, Title, checked
 from suboctave.errors import InputError, Key, Refusals, is_number, located, printable, shortened, suggest
 from suboctave.model.angles import Angle, Turns, check_angles, numbered, read_angles
 from suboctave.model.description import Arrays, build_part, describe_part, from_plain, plain_value
@@ -75,7 +75,7 @@ class System:
         elements: AnElement | Iterable[AnElement] = (),
         loads: ALoad | Iterable[ALoad] = (),
         parameters: Mapping[str, float] | None = None,
-        name: str = "",
+        name: Title = "",
         dof_names: Iterable[str] = (),
         structural: Any = None,
         units: str | None = None,
@@ -112,7 +112,7 @@ class System:
         cls,
         equations: str | Sequence[str],
         parameters: Mapping[str, float] | None = None,
-        name: str = "",
+        name: Title = "",
         units: str | None = None,
         angles: Any = None,
     ) -> System:

@@ -69,7 +69,7 @@ class SpaceOptions(UnitOptions, total=False):
         "dataset must have it: `to_xarray(readings=...)`.",
     ]
     harmonic: Annotated[
-        float | None,
+        float | str | None,
         "Of which harmonic (alone: its amplitude), a multiple of omega: 0 is the mean, 0.5 a component of motions of "
         "two load periods, which is zero for those of one.",
     ]
@@ -173,7 +173,7 @@ class View(Units):
     """
 
     quantity: str = ""
-    harmonic: float | None = None
+    harmonic: Any = None
     element: int | None = None
     dof: GivenDof | None = None
     xlim: Sequence[float] | None = None

@@ -15,7 +15,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from suboctave.arguments import checked
+from suboctave.arguments import Title, checked
 from suboctave.errors import InputError, damage, located, path_of, shortened, suggest
 from suboctave.structures import (
     abaqus,
@@ -67,7 +67,7 @@ def read_structure(
     damping: MatrixOrForm = None,
     dofs: Any = None,
     mesh: Mesh | None = None,
-    name: str | None = None,
+    name: Title | None = None,
     structural: MatrixOrForm = None,
 ) -> Structure:
     """A structure from one file with all matrices, or from one file for each.

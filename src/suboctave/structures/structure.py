@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from suboctave.arguments import Matrix, Rule, array_like, checked
+from suboctave.arguments import READ, Matrix, Rule, Title, array_like, checked
 from suboctave.errors import InputError, located, path_of, printable, shortened
 from suboctave.model.elements.base import Array, BaseElement
 from suboctave.model.expressions.coefficients import Coefficient, named_coefficient
@@ -56,9 +56,9 @@ class Structure:
     mass: Matrix
     stiffness: Matrix
     damping: MatrixOrForm = None
-    dofs: DofMap | None = None
+    dofs: Annotated[DofMap | None, READ] = None
     mesh: Mesh | None = None
-    name: str = ""
+    name: Title = ""
     structural: MatrixOrForm = None
 
     def __post_init__(self) -> None:
@@ -177,7 +177,7 @@ class Structure:
         loads: Iterable[Load] = (),
         parameters: Mapping[str, float] | None = None,
         damping: MatrixOrForm = None,
-        name: str = "",
+        name: Title = "",
         structural: MatrixOrForm = None,
         units: str | None = None,
         angles: Any = (),

@@ -73,7 +73,7 @@ class DesignMargin:
 @limited
 def design_margin(
     isola: Isola,
-    parameters: Sequence[str],
+    parameters: str | Sequence[str],
     *,
     at: float | None = None,
     scales: Mapping[str, float] | None = None,
@@ -151,7 +151,9 @@ class _Surface:
     sizes: np.ndarray
 
     @classmethod
-    def of(cls, isola: Isola, parameters: Sequence[str], here: float, scales: Mapping[str, float] | None) -> _Surface:
+    def of(
+        cls, isola: Isola, parameters: str | Sequence[str], here: float, scales: Mapping[str, float] | None
+    ) -> _Surface:
         """With arguments of the verb, checked."""
         known = list(isola.system.parameters)
         names = tuple(dict.fromkeys([parameters] if isinstance(parameters, str) else parameters))
