@@ -374,7 +374,7 @@ def test_stepping_options_that_make_no_sense(wrong, message):
 
 @pytest.mark.parametrize("wrong", [{"tolerance": 0.0}, {"tolerance": 1.0}, {"correction": -1.0}, {"iterations": 0}])
 def test_newton_options_that_make_no_sense(wrong):
-    with pytest.raises(InputError, match="out of range|must be a positive (whole )?number"):
+    with pytest.raises(InputError, match=r"out of range|must be a positive (whole )?number"):
         NewtonOptions(**wrong)
 
 

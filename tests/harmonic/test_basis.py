@@ -93,7 +93,7 @@ def test_real_and_complex_notation_against_the_discrete_fourier_transform():
     ],
 )
 def test_rules_for_adaptive_harmonics_that_make_no_sense_are_refused(wrong):
-    with pytest.raises(InputError, match="need|must be a positive"):
+    with pytest.raises(InputError, match=r"need|must be a positive"):
         AdaptiveHarmonics(**wrong)
 
 

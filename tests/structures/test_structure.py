@@ -236,7 +236,7 @@ def test_rayleigh_from_ratios_has_these_ratios(structure, chain):
     "pairs", [((1, 0.1), (1, 0.1)), ((0, 0.1), (1, 0.1)), ((1, 0.1), (2, -1)), (1, 2), ((1,), (2,))]
 )
 def test_rayleigh_refuses_what_has_no_answer(pairs):
-    with pytest.raises(so.InputError, match="from_ratios|must be two finite numbers"):
+    with pytest.raises(so.InputError, match=r"from_ratios|must be two finite numbers"):
         so.Rayleigh.from_ratios(*pairs)
 
 
