@@ -11,21 +11,21 @@ import difflib
 import operator
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
-from suboctave.arguments import READ, checked
+from suboctave.arguments import checked
 from suboctave.errors import InputError, shortened, suggest
 from suboctave.model.elements.base import Array
 from suboctave.model.loads import DIRECTIONS
 
 Node: TypeAlias = int | str
 Label: TypeAlias = tuple[Node, str]
-Labels: TypeAlias = Annotated[Iterable[tuple[Node, str]], READ]
+
 
 #: other names of the directions: numbers, those of Ansys (UX, ROTX), of Nastran (T1, R1)
 _OTHER_NAMES = {
@@ -94,7 +94,7 @@ class DofMap:
     labels: tuple[Label, ...]
     fixed: frozenset[Label]
 
-    def __init__(self, labels: Labels, fixed: Labels = ()) -> None:
+    def __init__(self, labels: Any, fixed: Any = ()) -> None:
         object.__setattr__(self, "labels", _labels(labels))
         object.__setattr__(self, "fixed", frozenset(_labels(fixed)))
         if len(self._places) < len(self.labels):

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from suboctave.arguments import READ, Matrix, Rule, Title, array_like, checked
+from suboctave.arguments import Matrix, Rule, Title, array_like, checked
 from suboctave.errors import InputError, located, path_of, printable, shortened
 from suboctave.model.elements.base import Array, BaseElement
 from suboctave.model.expressions.coefficients import Coefficient, named_coefficient
@@ -56,7 +56,7 @@ class Structure:
     mass: Matrix
     stiffness: Matrix
     damping: MatrixOrForm = None
-    dofs: Annotated[DofMap | None, READ] = None
+    dofs: Any = None
     mesh: Mesh | None = None
     name: Title = ""
     structural: MatrixOrForm = None
