@@ -279,11 +279,12 @@ def compare(answer: dict[str, Any], branch: so.Branch, width: float) -> Row:
     for i, j in pairs:
         row.worst = max(row.worst, abs(theirs[i]["omega"] - mine[j].omega) / theirs[i]["omega"])
     paired, own = {i for i, _ in pairs}, {j for _, j in pairs}
-    # events closer together than harmonics resolve may stand in another order, if the branch says that it is in doubt
+    # events closer together than harmonics resolve may come in another order, if the branch says so: by a stretch in
+    # doubt, or by uncertainties that overlap
     for i, item in enumerate(theirs):
         for j in range(len(mine)):
-            doubtful = i not in paired and j not in own and stated(item["omega"], branch, width)
-            if doubtful and same(item, mine[j], width):
+            doubtful = stated(item["omega"], branch, width) or overlaps(j, mine)
+            if i not in paired and j not in own and doubtful and same(item, mine[j], width):
                 paired.add(i)
                 own.add(j)
     for i, item in enumerate(theirs):
@@ -296,6 +297,12 @@ def compare(answer: dict[str, Any], branch: so.Branch, width: float) -> Row:
     row.added = [f"{item.kind} {item.omega:.9f}" for item in more]
     row.wrong = verdicts(counts, pairs, len(theirs), mine, branch)
     return row
+
+
+def overlaps(j: int, mine: list[so.Bifurcation]) -> bool:
+    """Whether an event and one next to it lie within their stated uncertainties of each other."""
+    beside = (mine[k] for k in (j - 1, j + 1) if 0 <= k < len(mine))
+    return any(abs(mine[j].omega - other.omega) <= mine[j].uncertainty + other.uncertainty for other in beside)
 
 
 def odd_part(orbit: so.PeriodicOrbit) -> float:

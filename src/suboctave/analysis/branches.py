@@ -26,20 +26,19 @@ from suboctave.curves.events.locate import Singular
 from suboctave.curves.follow import both_ways, follow
 from suboctave.curves.identity import same_event
 from suboctave.curves.junction import (
-    UNSEEN,
     Beside,
     beside,
-    between_values,
     curvature_of,
     doubling_curvature,
     emanating,
     leaving_doubling,
     period_name,
+    unseen,
 )
 from suboctave.curves.leaving import branch_beside, first_beside
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.starts import Harmonics, harmonics_of, linear_up_to, own_linear_part, start_point
-from suboctave.curves.trace import BranchPoint, Settings, Trace
+from suboctave.curves.trace import BranchPoint, Settings, Trace, Unsettled
 from suboctave.errors import ConvergenceError, InputError, is_number
 from suboctave.harmonic.linear_part import LinearPart
 from suboctave.harmonic.orbit import PeriodicOrbit
@@ -381,11 +380,17 @@ def _along_null_vector(item: Bifurcation, curve: MotionProblem, u: Array) -> Arr
     return _oriented(there / length(weights * there), weights)
 
 
+def _followed(start: CurvePoint, doubt: Unsettled | None, run: CurveRun) -> Trace:
+    """The branch from its first point on; `doubt`: what may happen unseen before that."""
+    trace = follow(start, 0.0, run.bounds, run.settings)
+    if doubt is not None:
+        trace.audit = trace.audit.in_doubt(doubt)
+    return trace
+
+
 def _departing(item: Bifurcation, curve: MotionProblem, u: Array, direction: Array, run: CurveRun) -> Trace:
     """The branch that leaves a bifurcation in one direction."""
-    notes: list[str] = []
-    trace = follow(_away(item, curve, u, direction, run.settings, notes), 0.0, run.bounds, run.settings)
-    trace.warnings[:0] = notes
+    trace = _followed(*_away(item, curve, u, direction, run.settings), run)
     trace.departs = replace(item, arclength=0.0)
     return trace
 
@@ -395,11 +400,9 @@ def leave_along(item: Bifurcation, curve: MotionProblem, direction: Array, run: 
     if direction[-1] * run.ahead < 0.0:
         direction = -direction
     curve, u = _at(item, curve)
-    notes: list[str] = []
-    one, other = (_away(item, curve, u, sign * direction, run.settings, notes) for sign in (1.0, -1.0))
+    (one, doubt), (other, doubt_behind) = (_away(item, curve, u, way * direction, run.settings) for way in (1.0, -1.0))
     here = replace(item, tangent=tuple(direction.tolist()))
-    forward = follow(one, 0.0, run.bounds, run.settings)
-    forward.warnings[:0] = notes
+    forward = _followed(one, doubt, run)
     if forward.closed or forward.interrupted:
         # a closed curve comes back through the branch point, located there with other harmonics perhaps
         reach = 2.0 * _distance(one, u, curve)
@@ -408,7 +411,7 @@ def leave_along(item: Bifurcation, curve: MotionProblem, direction: Array, run: 
         forward.bifurcations[:] = [replace(here, arclength=0.0), *met]
         forward.settle_end(reach)
         return forward
-    back = follow(other, 0.0, run.bounds, run.settings)
+    back = _followed(other, doubt_behind, run)
     gap = _distance(one, u, curve) + _distance(other, u, curve)
     trace = back.reversed_before(forward, gap)
     place = back.points[-1].arclength + _distance(other, u, curve)
@@ -456,9 +459,9 @@ def _oriented(direction: Array, weights: Array) -> Array:
 
 
 def _away(
-    item: Bifurcation, curve: MotionProblem, u: Array, direction: Array, settings: Settings, notes: list[str]
-) -> CurvePoint:
-    """The first point of a branch that leaves a bifurcation."""
+    item: Bifurcation, curve: MotionProblem, u: Array, direction: Array, settings: Settings
+) -> tuple[CurvePoint, Unsettled | None]:
+    """The first point of a branch that leaves a bifurcation, and what may happen unseen before it."""
     weights = curve.weights(u, 0.0)
     x, omega, values = curve.split(u)
     curve = curve.with_balance(curve.balance.settle(x, omega, values))
@@ -466,9 +469,8 @@ def _away(
         close = first_beside(curve, u, weights, direction / length(weights * direction))
     else:
         close = _closest(item, curve, u, direction, settings)
-    if not close.smooth:
-        notes.append(f"{between_values(curve.name, float(u[-1]), close.point.parameter)}: {UNSEEN}")
-    return close.point
+    doubt = None if close.smooth else unseen(curve.name, float(u[-1]), close.point.parameter)
+    return close.point, doubt
 
 
 def _closest(item: Bifurcation, curve: MotionProblem, u: Array, direction: Array, settings: Settings) -> Beside:

@@ -35,7 +35,7 @@ from suboctave.curves.events.monitors import (
 )
 from suboctave.curves.guard import Crossing, GuardedStep, StepGuard
 from suboctave.curves.identity import same_event
-from suboctave.curves.junction import UNSEEN, Meeting, lost, meeting, passes_doubling, plain_point, regular_point
+from suboctave.curves.junction import Meeting, lost, meeting, passes_doubling, plain_point, regular_point
 from suboctave.curves.leaving import multiple_at
 from suboctave.curves.ledgers import REASON, CountCheck, DoublingWatch, HiddenDoublings, pair_in
 from suboctave.curves.motion import CRITICAL, MotionEvaluation, MotionProblem
@@ -254,8 +254,8 @@ class _Follower(Driver):
         met, arclength = self._meeting[2], self.trace.points[-1].arclength
         if self.march.ending is not met.arrival.ending:
             return None
-        if met.doubt:
-            self.trace.warnings.append(f"{met.doubt}: {UNSEEN}")
+        if met.doubt is not None:
+            self._guard.audit = self._guard.audit.in_doubt(replace(met.doubt, arclength=(arclength, arclength)))
         kind, settings = multiple(PERIOD_DOUBLING, met.multiplicity), self.settings
         item = solved_bifurcation(kind, met.solution, met.parent, settings.observe, self.trace.warnings, arclength)
         return replace(item, multiplicity=met.multiplicity)

@@ -30,6 +30,7 @@ from suboctave.curves.blow_up import BlownUp, BlownUpEvaluation, DoubledMotions
 from suboctave.curves.events.locate import Guess, Singular, locate_multiple, locate_singular
 from suboctave.curves.identity import apart
 from suboctave.curves.motion import MotionProblem
+from suboctave.curves.trace import Unsettled
 from suboctave.errors import ConvergenceError
 from suboctave.floquet.monodromy import floquet_multipliers
 from suboctave.harmonic.basis import ComplexArray
@@ -147,9 +148,9 @@ class Junction:
         return f"the {self.kind} of the {period_name(self.nu)} motion at omega = {self.omega:.9g}"
 
 
-def between_values(name: str, first: float, last: float) -> str:
-    """Where on a curve, in words: two places right beside each other differ in late digits."""
-    return f"between {name} = {first:.9g} and {last:.9g}"
+def unseen(name: str, first: float, last: float) -> Unsettled:
+    """The stretch between a bifurcation and the first or last motion of a branch, which has no arclength."""
+    return Unsettled(name, first, last, (0.0, 0.0), UNSEEN)
 
 
 def period_name(nu: int) -> str:
@@ -180,7 +181,7 @@ def passes_doubling(b: CurvePoint) -> bool:
 class Meeting:
     """A branch that meets its parent: the parent's period doubling, its curve, how the march ends.
 
-    `doubt` says where between the last point and the parent something may happen unseen; empty if nowhere;
+    `doubt`: the stretch between the last point and the parent if something may happen unseen there;
     `multiplicity`: of the period doubling; `finer`: the branch with the harmonics that the doubling needs, where it has
     fewer.
     """
@@ -188,7 +189,7 @@ class Meeting:
     solution: Singular
     parent: MotionProblem
     arrival: Arrival
-    doubt: str = ""
+    doubt: Unsettled | None = None
     multiplicity: int = 1
     finer: DoubledMotions | None = None
 
@@ -228,8 +229,8 @@ def meeting(a: CurvePoint, b: CurvePoint, newton: NewtonOptions) -> Meeting | No
         before, smooth = None, True
     there = motions.transfer(parent.u_of(state), parent)
     where = motions.where(there)
-    ends = [float((a if before is None else before).u[-1]), float(there[-1])]
-    doubt = "" if smooth else between_values(motions.name, *ends)
+    last = float((a if before is None else before).u[-1])
+    doubt = None if smooth else unseen(motions.name, last, float(there[-1]))
     reason = f"met the {period_name(basis.nu // 2)} motion at its period doubling at {where}"
     arrival = Arrival(before, Ending(EndReason.MET_BRANCH, where, reason))
     return Meeting(doubling, parent, arrival, doubt, several, finer)

@@ -141,6 +141,10 @@ class Audit:
         """True if nothing is in doubt."""
         return not self.unsettled
 
+    def in_doubt(self, *stretches: Unsettled) -> Audit:
+        """This audit with more stretches in doubt."""
+        return replace(self, unsettled=tuple(joined((*self.unsettled, *stretches))))
+
     def reversed_before(self, other: Audit, whole: float, gap: float = 0.0) -> Audit:
         """This audit's stretch, of length `whole`, walked backwards, and then, beyond a gap, that of `other`."""
         start = whole + gap

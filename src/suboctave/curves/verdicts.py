@@ -68,7 +68,7 @@ def with_verdicts(trace: Trace, method: StabilityMethod, name: str) -> Trace:
         if stretch is None:
             continue
         first, last = stretch.arclength
-        if not any(first <= u.arclength[1] and u.arclength[0] <= last for u in (*trace.audit.unsettled, *unsettled)):
+        if not any(first < u.arclength[1] and u.arclength[0] < last for u in (*trace.audit.unsettled, *unsettled)):
             unsettled.append(stretch)
     notes += [note for item in bifurcations if (note := _doubt_beside(item, bifurcations)) is not None]
     notes += [*_standing(points, name), *_replaced(points, method, name), *_at_most(points, name)]
