@@ -76,7 +76,7 @@ def cases(title: str, system: so.System, omega: tuple[float, float]) -> list[Cas
     whole = so.frequency_response(system, omega, max_step=STEPS[0])
     found = [Case(f"{title}, symmetric", system, omega, (whole.orbits[0], whole.orbits[-1]))]
     for item in whole.bifurcations["BP"]:
-        half = so.switch_branch(item, 1, max_step=STEPS[0])
+        half = so.switch_branch(item, side=1, max_step=STEPS[0])
         # as far as the unsymmetric motions lead away from the branch point without turning back
         way = abs(half.omega - item.omega)
         last = next((i for i in range(1, len(way)) if way[i] < way[i - 1]), len(way)) - 1

@@ -43,7 +43,7 @@ CASES = [("exact law", None, h, EXACT) for h in (7, 15, 31, 63)] + [("s = 3000",
 def start(regularization: float | None, harmonics: int, omega: float) -> Guess:
     """The motion some way above a period doubling."""
     system = so.library.reference_oscillator(p=0.55, regularization=regularization)
-    orbit = so.frequency_response(system, (omega + 2.0 * AWAY, omega + AWAY), harmonics).orbits[-1]
+    orbit = so.frequency_response(system, (omega + 2.0 * AWAY, omega + AWAY), harmonics=harmonics).orbits[-1]
     return Guess(orbit.state(), "omega", 3.2)
 
 

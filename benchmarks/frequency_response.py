@@ -45,7 +45,7 @@ def cases() -> dict[str, Callable[[], so.Branch]]:
     absorber, chain, duffing = so.library.nltva(0.11), chain_of_ten(), so.library.duffing()
 
     def response(system: so.System, omega: tuple[float, float], harmonics: int | str) -> Callable[[], so.Branch]:
-        return lambda: so.frequency_response(system, omega, harmonics)
+        return lambda: so.frequency_response(system, omega, harmonics=harmonics)
 
     found = {}
     for law, system in (("exact", exact), ("s=3000", arctan)):

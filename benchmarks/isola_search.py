@@ -52,7 +52,7 @@ def closed_at(system: so.System, order: int) -> list[so.Branch]:
     """Closed branches that no branch leads to, as far as their own ends and branch points tell."""
     low, high = OMEGA
     whole: list[so.Branch] = []
-    for branch in so.find_subharmonics(system, OMEGA, order):
+    for branch in so.find_subharmonics(system, OMEGA, subharmonic=order):
         if any(lies_on(branch.orbits[len(branch) // 2], known.points) for known in whole):
             continue
         if not branch.closed and branch.departs is None and branch.arrives is None:

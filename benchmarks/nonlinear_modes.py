@@ -43,7 +43,7 @@ def main(repeats: int) -> None:
         # of many undamped masses some is in resonance with every higher harmonic: there the rule asks for more and more
         for harmonics in (9, "adaptive") if system.n < 10 else (9,):
             works: list[Callable[[], so.Branch]] = [
-                lambda s=system, w=omega, h=harmonics: so.frequency_response(s, w, h)
+                lambda s=system, w=omega, h=harmonics: so.frequency_response(s, w, harmonics=h)
             ]
             for damped in (False, True):
                 works.append(

@@ -43,7 +43,7 @@ def orbits() -> dict[str, so.PeriodicOrbit]:
         "n=10": (ten_masses(), (0.6, 0.62)),
     }
     return {
-        f"{name}, H={harmonics}": so.frequency_response(system, omega, harmonics).orbits[-1]
+        f"{name}, H={harmonics}": so.frequency_response(system, omega, harmonics=harmonics).orbits[-1]
         for name, (system, omega) in cases.items()
         for harmonics in (15, 31)
     }
@@ -60,7 +60,7 @@ def timed(work: Callable[[], object], least: float = 0.0) -> float:
 
 def main(repeats: int) -> None:
     motions = orbits()
-    results = {(m, o): so.stability(orbit, METHODS[m]) for o, orbit in motions.items() for m in METHODS}
+    results = {(m, o): so.stability(orbit, method=METHODS[m]) for o, orbit in motions.items() for m in METHODS}
     matrix = np.random.default_rng(0).standard_normal((62, 62))
     unit: list[float] = []
     times: dict[tuple[str, str], list[float]] = {key: [] for key in results}
@@ -68,7 +68,7 @@ def main(repeats: int) -> None:
         for (m, o), spent in times.items():
             unit.append(timed(lambda: np.linalg.eigvals(matrix), 0.005))
             method, orbit = METHODS[m], motions[o]
-            spent.append(timed(lambda method=method, orbit=orbit: so.stability(orbit, method), 0.01))
+            spent.append(timed(lambda method=method, orbit=orbit: so.stability(orbit, method=method), 0.01))
     eigvals = float(np.median(unit))
     print(
         f"suboctave {so.__version__}, Python {platform.python_version()}, NumPy {np.__version__}, {platform.machine()}"

@@ -55,7 +55,7 @@ def measured(family: str, n: int, kind: str, tracks: bool) -> str:
     warm = so.library.reference_oscillator(p=0.55, j=0.0)
     so.frequency_response(warm, (2.4, 2.2), harmonics=HARMONICS)
     start = time.perf_counter()
-    linear = so.condense(system, omega, HARMONICS)
+    linear = so.condense(system, omega, harmonics=HARMONICS)
     ready = time.perf_counter() - start
     best = np.inf
     for _ in range(3):

@@ -54,7 +54,7 @@ class SaturatingSpring(so.Element):
 
 
 spring = SaturatingSpring(dof=0, k="k", F0="F0")
-report = so.check_derivatives(spring, PARAMETERS)
+report = so.check_derivatives(spring, parameters=PARAMETERS)
 print(report)
 assert report.ok
 

@@ -19,8 +19,8 @@ print(effects)
 (strongest, *_) = effects.ranked("j")
 print(f"one per cent of {strongest} moves the birth by {effects.per_cent(strongest, 'j'):.3g} per cent of the gap")
 
-margin = so.design_margin(isola, [strongest])
-together = so.design_margin(isola, ["zeta", "Kc", "p"])
+margin = so.design_margin(isola, by=[strongest])
+together = so.design_margin(isola, by=["zeta", "Kc", "p"])
 print(margin)
 print(together)
 

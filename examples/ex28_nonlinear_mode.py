@@ -14,7 +14,7 @@ import numpy as np
 import suboctave as so
 
 system = so.System(np.eye(2), np.zeros((2, 2)), [[2.0, -1.0], [-1.0, 2.0]], elements=[so.CubicSpring(0, 0.5)])
-mode = so.nonlinear_mode(system, 1, amplitude=(0.01, 5.0))
+mode = so.nonlinear_mode(system, mode=1, amplitude=(0.01, 5.0))
 print(mode)
 (crossing,) = mode.bifurcations["BP"]
 tongue = so.switch_branch(crossing, bounds=(1.2, 1.39))

@@ -30,7 +30,7 @@ print(f"lowest peak {lowest.amplitude:.5f} at zeta = {lowest.parameters['zeta']:
 
 duffing = so.library.duffing(c=0.05, alpha=1.0, F=0.1)
 curve = so.frequency_response(duffing, (0.7, 2.0))
-backbone = so.phase_resonance(duffing, "F", (0.01, 0.3), omega=(0.7, 2.0))
+backbone = so.phase_resonance(duffing, parameter="F", bounds=(0.01, 0.3), omega=(0.7, 2.0))
 peaks = so.track_peak(curve, "F", (0.01, 0.3))
 ends = [float(np.interp(0.2, one.parameter("F"), one.amplitude)) for one in (backbone, peaks)]
 print(f"F = 0.2: in quadrature {ends[0]:.5f}, highest {ends[1]:.5f}")

@@ -210,10 +210,10 @@ def test_what_makes_sense_is_taken(system):
     """Numbers of NumPy, whole numbers written 5.0, lists and arrays for pairs, tables of pandas for columns."""
     import pandas
 
-    first = so.frequency_response(system, [0.9, 0.95], 3.0)
+    first = so.frequency_response(system, [0.9, 0.95], harmonics=3.0)
     column = pandas.Series([0.9, 0.95], index=["from", "to"])
     for pair in (np.array([0.9, 0.95]), column, (np.float32(0.9), np.float64(0.95))):
-        other = so.frequency_response(system, pair, np.int64(3))
+        other = so.frequency_response(system, pair, harmonics=np.int64(3))
         assert np.allclose(other.omega[:1], first.omega[:1])
     assert so.HarmonicBasis(np.int64(3)) == so.HarmonicBasis(3.0) == so.HarmonicBasis(3)
     assert so.NewtonOptions(longest=np.inf).longest == np.inf
@@ -231,7 +231,7 @@ def test_what_the_package_makes_itself_is_not_compared(system, monkeypatch):
     points = []
     for step in (0.06, 0.003):
         counts.append(0)
-        points.append((len(so.frequency_response(system, (0.7, 0.8), 3, max_step=step)), len(counts)))
+        points.append((len(so.frequency_response(system, (0.7, 0.8), harmonics=3, max_step=step)), len(counts)))
         counts.clear()
     (few, compared), (many, again) = points
     assert many > 4 * few

@@ -36,5 +36,5 @@ for run in (plain, tapped):
     assert (run.period == 0).sum() <= 1
     for s in range(2):
         for v in np.flatnonzero(run.period[s]):
-            orbit = so.periodic_orbit(oscillator, run.omega[v], run.ends[s, v], int(run.period[s, v]))
+            orbit = so.periodic_orbit(oscillator, run.omega[v], state=run.ends[s, v], subharmonic=int(run.period[s, v]))
             assert np.isclose(abs(run.response[s, v, 0]), abs(orbit.harmonic(1)), rtol=1e-3), (run.omega[v], s)

@@ -60,6 +60,8 @@ Given = TypeVar("Given")
 _PACKAGE = "suboctave."
 #: the largest count of anything
 _MOST = 100_000_000
+#: names of keywords that a message lists
+_LISTED = 6
 
 
 #: arguments by the letters of the field that some write for them, in small letters
@@ -217,6 +219,13 @@ class _Table:
 
     def placed(self, given: Sequence[Any]) -> list[Any]:
         """What was given by place, read."""
+        if len(given) > len(self.places) and self.rest is None:
+            by_name = [f"{name}=" for name in self.readings if name not in self.places]
+            listed = f": give others by name ({', '.join(by_name[:_LISTED])}{', ...' * (len(by_name) > _LISTED)})"
+            raise TypeError(
+                f"{self.name}() takes {', '.join(self.places) or 'nothing'} by place, not {len(given)} values"
+                f"{listed if by_name else ''}"
+            )
         named = [self.read(name, self.readings[name], value) for name, value in zip(self.places, given, strict=False)]
         more = given[len(named) :]
         return [*named, *(more if self.rest is None else (self.read("each argument", self.rest, one) for one in more))]

@@ -25,9 +25,9 @@ def system():
 
 def test_a_state_of_two_dofs_leads_to_its_motion(system):
     """The state of a stable motion, integrated for one period, is that motion."""
-    curve = so.frequency_response(system, (1.2, 2.5), 15)
+    curve = so.frequency_response(system, (1.2, 2.5), harmonics=15)
     orbit = next(p.orbit for p in curve.points if p.floquet.stable and p.orbit.amplitude(1) > 0.4)
-    again = so.frequency_response(system, (orbit.omega, 2.5), 15, start=orbit.start())
+    again = so.frequency_response(system, (orbit.omega, 2.5), harmonics=15, start=orbit.start())
     np.testing.assert_allclose(again.orbits[0].coefficients, orbit.coefficients, atol=1e-8 * curve.amplitude.max())
 
 
@@ -57,7 +57,7 @@ def test_the_rest_can_be_continued_and_verified(system):
 
 
 def test_an_interrupt_ends_both_directions(system):
-    orbit = so.frequency_response(system, (1.2, 2.5), 9).orbits[20]
+    orbit = so.frequency_response(system, (1.2, 2.5), harmonics=9).orbits[20]
     calls = 0
 
     def stop(_share, _where):

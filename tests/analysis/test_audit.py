@@ -26,7 +26,7 @@ def both_ways(system, omega, max_step=None, harmonics="adaptive", **options):
     """The curve in both directions."""
     low, high = omega
     ways = ((low, high), (high, low))
-    return [so.frequency_response(system, way, harmonics, max_step=max_step, **options) for way in ways]
+    return [so.frequency_response(system, way, harmonics=harmonics, max_step=max_step, **options) for way in ways]
 
 
 def doubtful(places, values, at):
@@ -206,7 +206,7 @@ def test_a_pair_that_only_more_harmonics_show(max_step):
 
 def test_a_fixed_number_of_harmonics_says_what_it_cannot_show():
     """With five harmonics and no more allowed, the multipliers cross and the equations' own test does not."""
-    curve = so.frequency_response(rattling(0.177125), (2.4, 1.7), 5)
+    curve = so.frequency_response(rattling(0.177125), (2.4, 1.7), harmonics=5)
     assert not curve.bifurcations["PD"]
     stated = [u for u in curve.audit.unsettled if "-1" in u.reason or "-1.0000" in u.reason]
     assert any(min(u.first, u.last) < 2.0217 < max(u.first, u.last) for u in stated)

@@ -20,7 +20,9 @@ def test_it_lies_on_the_free_vibration_but_for_the_square_of_the_damping():
     for zeta in (0.01, 0.02, 0.04):
         force = zeta
         system = so.System(1.0, 2.0 * zeta, 1.0, [so.CubicSpring(0, 1.0)], [so.HarmonicLoad(0, "F")], {"F": force})
-        curve = so.phase_resonance(system, "F", (0.2 * force, 4.0 * force), omega=(0.7, 2.5), harmonics=15)
+        curve = so.phase_resonance(
+            system, parameter="F", bounds=(0.2 * force, 4.0 * force), omega=(0.7, 2.5), harmonics=15
+        )
         free = free_frequency(curve.amplitude)
         at = np.argmin(np.abs(curve.amplitude - 0.8))
         distances.append(abs(curve.omega[at] / free[at] - 1.0))
@@ -30,7 +32,7 @@ def test_it_lies_on_the_free_vibration_but_for_the_square_of_the_damping():
 
 def test_it_is_what_track_follows_from_the_peak():
     system = so.library.duffing(c=0.05, alpha=1.0, F=0.1)
-    curve = so.phase_resonance(system, "F", (0.05, 0.2), omega=(0.7, 2.0), harmonics=3)
+    curve = so.phase_resonance(system, parameter="F", bounds=(0.05, 0.2), omega=(0.7, 2.0), harmonics=3)
     np.testing.assert_allclose(curve.omega, free_frequency(curve.amplitude), rtol=2e-3)
     response = so.frequency_response(system, (0.7, 2.0), harmonics=3)
     peak = response.points[int(np.argmax(response.amplitude))]
@@ -45,7 +47,13 @@ def test_it_is_what_track_follows_from_the_peak():
 def test_superharmonic_and_subharmonic_resonances(harmonic, order, omega, force):
     system = so.library.duffing(c=0.02, alpha=1.0, F=force)
     curve = so.phase_resonance(
-        system, "F", (0.9 * force, 1.1 * force), omega=omega, harmonic=harmonic, order=order, harmonics=7
+        system,
+        parameter="F",
+        bounds=(0.9 * force, 1.1 * force),
+        omega=omega,
+        harmonic=harmonic,
+        subharmonic=order,
+        harmonics=7,
     )
     assert len(curve) > 3
     for orbit in curve.orbits:
@@ -56,9 +64,9 @@ def test_superharmonic_and_subharmonic_resonances(harmonic, order, omega, force)
 def test_what_has_no_phase_is_refused():
     two = so.System(1.0, 0.1, 1.0, [so.CubicSpring(0, 1.0)], [so.HarmonicLoad(0, ["F", 0.1], [1, 2])], {"F": 0.1})
     with pytest.raises(so.InputError, match="multiples 1, 2 of omega"):
-        so.phase_resonance(two, "F", (0.05, 0.2), omega=(0.7, 2.0))
+        so.phase_resonance(two, parameter="F", bounds=(0.05, 0.2), omega=(0.7, 2.0))
     one = so.library.duffing(F=0.1)
     with pytest.raises(so.InputError, match="common factor"):
-        so.phase_resonance(one, "F", (0.05, 0.2), omega=(0.7, 2.0), harmonic=2, order=2)
+        so.phase_resonance(one, parameter="F", bounds=(0.05, 0.2), omega=(0.7, 2.0), harmonic=2, subharmonic=2)
     with pytest.raises(so.ConvergenceError, match="in quadrature"):
-        so.phase_resonance(one, "F", (0.05, 0.2), omega=(0.1, 0.2), harmonics=3)
+        so.phase_resonance(one, parameter="F", bounds=(0.05, 0.2), omega=(0.1, 0.2), harmonics=3)

@@ -65,7 +65,7 @@ def branch_point(system, omega, near):
 
 def unsymmetric(item, away=0.05):
     """A motion of the branch that leaves, where omega has gone some way (as a share of it) from the branch point."""
-    half = so.switch_branch(item, 1)
+    half = so.switch_branch(item, side=1)
     return next(orbit for orbit in half.orbits if abs(orbit.omega / item.omega - 1.0) > away)
 
 

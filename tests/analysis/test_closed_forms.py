@@ -94,7 +94,7 @@ def test_static_load_on_a_nonlinear_oscillator():
     """A constant force bends the symmetric oscillator: even harmonics, and the motion of shooting."""
     loads = [so.HarmonicLoad(0, 0.4, static=0.6)]
     system = so.System(1.0, 0.1, 1.0, [so.CubicSpring(0, 1.0)], loads)
-    curve = so.frequency_response(system, (3.5, 0.9), 25)
+    curve = so.frequency_response(system, (3.5, 0.9), harmonics=25)
     assert np.abs(curve.harmonic(2)).max() > 0.01
     for orbit in curve.orbits[:: len(curve) // 4]:
         check = so.verify(orbit, tolerance=1e-8)
@@ -106,7 +106,7 @@ def test_loads_of_several_harmonics_on_a_nonlinear_oscillator():
     system = so.System(
         np.diag([1.0, 0.5]), 0.05 * np.eye(2), [[2.0, -1.0], [-1.0, 1.0]], [so.CubicSpring((0, 1), 0.5)], loads
     )
-    curve = so.frequency_response(system, (2.6, 2.2), 25)
+    curve = so.frequency_response(system, (2.6, 2.2), harmonics=25)
     for orbit in (curve.orbits[0], curve.orbits[-1]):
         check = so.verify(orbit, tolerance=1e-8)
         assert check.agrees, check

@@ -123,9 +123,9 @@ def test_restart_equals_the_uninterrupted_run(rattling_curve):
 def test_restart_with_fixed_harmonics_is_exact():
     """With the number of harmonics given, even the digits of the end agree."""
     system = so.library.reference_oscillator()
-    whole = so.frequency_response(system, (4.5, 1.3), 15)
+    whole = so.frequency_response(system, (4.5, 1.3), harmonics=15)
     at = int(np.argmax(whole.omega < 3.0))
-    rest = so.frequency_response(system, (whole.omega[at], 1.3), 15, start=whole.orbits[at])
+    rest = so.frequency_response(system, (whole.omega[at], 1.3), harmonics=15, start=whole.orbits[at])
     assert rest.orbits[0].coefficients == pytest.approx(whole.orbits[at].coefficients, abs=1e-12)
     assert rest.orbits[-1].coefficients == pytest.approx(whole.orbits[-1].coefficients, abs=1e-9)
     assert [b.omega for b in rest.bifurcations] == pytest.approx(

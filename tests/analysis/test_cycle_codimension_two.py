@@ -19,7 +19,7 @@ def cycles(*others, bounds=(-0.03, 0.01), **parameters):
     system = so.System.from_equations([RUBBING, *others], {"mu": 0.0, **parameters})
     hopf = so.equilibria(system, "mu", (-0.1, 0.1)).bifurcations["Hopf"]
     first = min(hopf, key=lambda item: abs(item.parameters["mu"]))
-    return so.limit_cycles(first, bounds, harmonics=5)
+    return so.limit_cycles(first, bounds=bounds, harmonics=5)
 
 
 @pytest.fixture(scope="module")
@@ -137,14 +137,14 @@ def pumped(g):
     second = "y'' + 0.1*y' + (0.27 + 0.4*x)*y + g*y**3 + 0.3*y**2 = 0"
     system = so.System.from_equations([first, second], {"mu": 0.0, "g": g})
     hopf = so.equilibria(system, "mu", (-0.1, 0.3)).bifurcations["Hopf"][0]
-    (doubling,) = so.limit_cycles(hopf, (-0.01, 0.03)).bifurcations["PD"]
+    (doubling,) = so.limit_cycles(hopf, bounds=(-0.01, 0.03)).bifurcations["PD"]
     return doubling
 
 
 def measured_curvature(doubling):
     """Of the doubled branch: mu over the square of its half-odd part, in units of the null vector."""
     phi = doubling.null_vectors.right * doubling.orbit.state().balance.row_weights(len(doubling.null_vectors.right))
-    branch = so.switch_branch(doubling, 1)
+    branch = so.switch_branch(doubling, side=1)
     found = []
     for orbit in branch.orbits[1:3]:
         odd = range(1, orbit.basis.harmonics + 1, 2)
@@ -186,7 +186,7 @@ def test_the_criticality_of_tori_by_averaging(back, expected):
     )
     hopf = so.equilibria(system, "mu", (-0.1, 0.1)).bifurcations["Hopf"]
     first = min(hopf, key=lambda item: abs(item.parameters["mu"]))
-    (torus,) = so.limit_cycles(first, (0.0, 0.03), harmonics=5).bifurcations["NS"]
+    (torus,) = so.limit_cycles(first, bounds=(0.0, 0.03), harmonics=5).bifurcations["NS"]
     assert torus.criticality == ("supercritical" if expected < 0.0 else "subcritical")
     phi = torus.null_vectors.right * torus.orbit.state().balance.row_weights(len(torus.null_vectors.right))
     # of A phi and its conjugate

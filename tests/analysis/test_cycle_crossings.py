@@ -23,7 +23,7 @@ def test_a_pitchfork_of_limit_cycles():
     assert crossing.parameter("p") in [b.parameter("p") for b in moving.bifurcations["BP"]]
     assert np.abs(moving.harmonic(1, 1)).max() > 0.5
     assert moving.parameter("p").max() == pytest.approx(crossing.parameter("p"), abs=1e-4)
-    half = so.switch_branch(crossing, 1)
+    half = so.switch_branch(crossing, side=1)
     assert half.departs.kind == "BP"
     # back onto the first curve from the point as the second has it
     (there,) = moving.bifurcations["BP"]

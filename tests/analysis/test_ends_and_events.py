@@ -118,7 +118,7 @@ def test_event_of_one_harmonic_against_its_formula():
     """Amplitude 1 of one harmonic: `omega` from `F^2 = (k + 3/4 - omega^2)^2 + (c omega)^2`."""
     system = so.library.duffing(c=0.1, F=0.3)
     event = so.Event("one", lambda orbit: abs(orbit.harmonic(1)) - 1.0)
-    curve = so.frequency_response(system, (3.0, 0.5), 1, events=event)
+    curve = so.frequency_response(system, (3.0, 0.5), harmonics=1, events=event)
     b = 1.75
     roots = np.roots([1.0, 0.01 - 2.0 * b, b**2 - 0.09])
     assert sorted(e.omega for e in curve.events) == pytest.approx(sorted(np.sqrt(roots)), abs=1e-9)

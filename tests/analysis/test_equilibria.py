@@ -109,7 +109,7 @@ def test_frequencies_beyond_those_at_the_start_are_noticed():
 
 def test_sensitivities_of_a_hopf_point(wing):
     (hopf,) = so.equilibria(wing, "U", (0.2, 2.5)).bifurcations["Hopf"]
-    found = so.sensitivity(hopf, ["zeta", "e"])
+    found = so.sensitivity(hopf, by=["zeta", "e"])
     for name in ("zeta", "e"):
         step = 1e-5 * wing.parameters[name]
         sides = [
@@ -144,7 +144,7 @@ def test_wrong_use_is_refused(wing):
         so.equilibria(wing, "U", (0.5, 1.0), highest=-1.0)
     found = so.equilibria(wing, "U", (0.2, 2.5))
     with pytest.raises(so.InputError, match="nothing moves there"):
-        so.limit_cycles(found.points[0], (0.2, 2.0), "U")
+        so.limit_cycles(found.points[0], bounds=(0.2, 2.0), parameter="U")
 
 
 @pytest.mark.parametrize("apart", [1e-8, *slow(0.0, 1e-6)])
@@ -159,7 +159,7 @@ def test_pairs_of_different_frequency_that_cross_at_one_parameter_are_all_hopf_p
     assert sorted(item.omega for item in found) == pytest.approx([1.0, 2.0, 3.0], abs=1e-9)
     assert sorted(item.parameter("mu") for item in found) == pytest.approx([0.0, 0.0, apart], abs=1e-12)
     assert not any("do not explain" in note or "another multiplier" in note for note in curve.warnings)
-    cycles = [so.limit_cycles(item, (-0.2, 0.3)) for item in found]
+    cycles = [so.limit_cycles(item, bounds=(-0.2, 0.3)) for item in found]
     assert sorted(round(float(one.omega.max()), 6) for one in cycles) == [1.0, 2.0, 3.0]
 
 

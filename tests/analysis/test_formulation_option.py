@@ -48,10 +48,10 @@ def places(curve):
 
 def test_a_test_of_the_leading_multiplier_misses_what_another_hides(two):
     """The paper's second test sees two of four; the audit says which it missed, and nothing else is in doubt."""
-    whole = so.frequency_response(two, (4.9, 2.2), 7, formulation="extended")
+    whole = so.frequency_response(two, (4.9, 2.2), harmonics=7, formulation="extended")
     assert places(whole) == pytest.approx(PLACES, abs=1e-9)
     assert whole.audit.complete
-    curve = so.frequency_response(two, (4.9, 2.2), 7, formulation=so.Alcorta2019(test="multiplier"))
+    curve = so.frequency_response(two, (4.9, 2.2), harmonics=7, formulation=so.Alcorta2019(test="multiplier"))
     assert places(curve) == pytest.approx([PLACES[0], PLACES[3]], abs=5e-5)
     assert len(curve.audit.unsettled) == 2
     for stretch, place in zip(curve.audit.unsettled, PLACES[1:3], strict=True):
@@ -65,7 +65,9 @@ def test_a_test_of_the_leading_multiplier_misses_what_another_hides(two):
 def test_what_is_missed_beside_what_is_found():
     """Period doublings in neighbouring steps: each passage of -1 is matched with its own."""
     faster = 1.008
-    curve = so.frequency_response(two_oscillators(faster), (4.1, 2.25), 7, formulation="alcorta2019", max_step=0.02)
+    curve = so.frequency_response(
+        two_oscillators(faster), (4.1, 2.25), harmonics=7, formulation="alcorta2019", max_step=0.02
+    )
     assert places(curve) == pytest.approx([faster * UPPER, LOWER], abs=5e-5)
     assert len(curve.audit.unsettled) == 2
     for stretch, place in zip(curve.audit.unsettled, [UPPER, faster * LOWER], strict=True):
@@ -73,7 +75,9 @@ def test_what_is_missed_beside_what_is_found():
 
 
 def test_the_determinant_has_a_minimum_at_every_period_doubling_of_close_points(two):
-    curve = so.frequency_response(two, (4.9, 2.2), 7, formulation=so.Alcorta2019("determinant"), max_step=0.03)
+    curve = so.frequency_response(
+        two, (4.9, 2.2), harmonics=7, formulation=so.Alcorta2019("determinant"), max_step=0.03
+    )
     assert places(curve) == pytest.approx(PLACES, abs=5e-5)
     assert not curve.warnings
 
@@ -81,11 +85,15 @@ def test_the_determinant_has_a_minimum_at_every_period_doubling_of_close_points(
 def test_the_determinant_needs_close_points():
     """det B carries a power of omega that grows with the harmonics: with steps of 0.1 the minimum is passed."""
     system = so.library.reference_oscillator(p=0.55)
-    far = so.frequency_response(system, (4.5, 3.5), 31, formulation=so.Alcorta2019("determinant"), max_step=0.3)
+    far = so.frequency_response(
+        system, (4.5, 3.5), harmonics=31, formulation=so.Alcorta2019("determinant"), max_step=0.3
+    )
     assert places(far) == []
     (missed,) = far.audit.unsettled
     assert missed.last < 3.9697105 < missed.first
-    near = so.frequency_response(system, (4.1, 3.9), 31, formulation=so.Alcorta2019("determinant"), max_step=0.003)
+    near = so.frequency_response(
+        system, (4.1, 3.9), harmonics=31, formulation=so.Alcorta2019("determinant"), max_step=0.003
+    )
     assert places(near) == pytest.approx([3.9697105], abs=1e-6)
     assert near.audit.complete
 
@@ -94,7 +102,7 @@ def test_the_determinant_needs_close_points():
 def test_either_direction_and_two_residuals(way):
     """Both directions, the bifurcation in the order met, its residual that of the system and its orbit's that of R."""
     system = so.library.reference_oscillator(p=0.55)
-    curve = so.frequency_response(system, way, 15, formulation="alcorta2019")
+    curve = so.frequency_response(system, way, harmonics=15, formulation="alcorta2019")
     (found,) = curve.bifurcations
     assert found.omega == pytest.approx(3.9697105, abs=1e-6)
     assert found.orbit.residual < 1e-12 < found.residual < 1e-6
@@ -118,11 +126,11 @@ def test_every_verb_and_every_start():
 
 def test_options_last(tmp_path):
     system = so.library.reference_oscillator(p=0.55)
-    curve = so.frequency_response(system, (4.1, 3.9), 7, formulation=so.Alcorta2019("determinant"))
+    curve = so.frequency_response(system, (4.1, 3.9), harmonics=7, formulation=so.Alcorta2019("determinant"))
     curve.save(tmp_path / "curve.nc")
     assert so.load(tmp_path / "curve.nc").options == curve.options
     assert curve.options["formulation"] == "Alcorta2019(test='determinant')"
-    assert so.frequency_response(system, (4.1, 4.0), 7).options["formulation"] == "bordered"
+    assert so.frequency_response(system, (4.1, 4.0), harmonics=7).options["formulation"] == "bordered"
 
 
 @pytest.mark.parametrize(
@@ -149,7 +157,7 @@ def test_wrong_test_functions_are_refused():
 
 def test_the_count_takes_what_is_accounted_for_elsewhere(two):
     """A period doubling that a test function misses is said once, not again by the count."""
-    curve = so.frequency_response(two, (4.1, 3.9), 7)
+    curve = so.frequency_response(two, (4.1, 3.9), harmonics=7)
     ends = [_Sample(curve.points[0].floquet), _Sample(curve.points[-1].floquet)]
     assert ends[0].floquet.unstable != ends[1].floquet.unstable
     for unseen in (False, True):
@@ -160,7 +168,7 @@ def test_the_count_takes_what_is_accounted_for_elsewhere(two):
 
 def test_the_count_says_in_words_that_it_should_have_changed(two):
     """One located period doubling between motions with as many unstable multipliers."""
-    curve = so.frequency_response(two, (4.1, 3.9), 7)
+    curve = so.frequency_response(two, (4.1, 3.9), harmonics=7)
     check, sample = CountCheck(), _Sample(curve.points[0].floquet)
     assert check.complaint(sample, []) is None
     assert check.complaint(sample, ["PD"])[2].startswith(

@@ -112,7 +112,7 @@ def test_wrong_input_is_refused_as_such():
 # ------------------------------------------------------------------------------------------------------- slow functions
 VERBS = {
     "response": lambda system, **given: so.frequency_response(system, RANGE, **given),
-    "sub-harmonics": lambda system, **given: so.find_subharmonics(system, RANGE, 3, **given),
+    "sub-harmonics": lambda system, **given: so.find_subharmonics(system, RANGE, subharmonic=3, **given),
     "in time": lambda system, **given: so.integrate(system, omega=1.0, periods=1000, **given),
     "exponents": lambda system, **given: so.lyapunov_exponents(system, omega=1.0, **given),
     "sections": lambda system, **given: so.poincare_sections(system, omega=1.0, **given),

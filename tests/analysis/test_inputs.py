@@ -40,13 +40,16 @@ RESPONSE = {
     "negative": (lambda s, b: so.frequency_response(s, (-1, 1)), "frequencies are positive, in rad per unit time"),
     "zero": (lambda s, b: so.frequency_response(s, (0, 1)), "frequencies are positive"),
     "text": (lambda s, b: so.frequency_response(s, ("low", "high")), r"omega\[0\] must be a finite number, not 'low'"),
-    "no harmonics": (lambda s, b: so.frequency_response(s, (1, 2), 0), "whole number of at least 1.*not 0"),
-    "negative harmonics": (lambda s, b: so.frequency_response(s, (1, 2), -3), "whole number of at least 1.*not -3"),
-    "half a harmonic": (lambda s, b: so.frequency_response(s, (1, 2), 7.5), "whole number.*not 7.5"),
-    "misspelt": (lambda s, b: so.frequency_response(s, (1, 2), "adaptiv"), '"adaptive"'),
-    "true": (lambda s, b: so.frequency_response(s, (1, 2), True), "whole number.*not True"),
+    "no harmonics": (lambda s, b: so.frequency_response(s, (1, 2), harmonics=0), "whole number of at least 1.*not 0"),
+    "negative harmonics": (
+        lambda s, b: so.frequency_response(s, (1, 2), harmonics=-3),
+        "whole number of at least 1.*not -3",
+    ),
+    "half a harmonic": (lambda s, b: so.frequency_response(s, (1, 2), harmonics=7.5), "whole number.*not 7.5"),
+    "misspelt": (lambda s, b: so.frequency_response(s, (1, 2), harmonics="adaptiv"), '"adaptive"'),
+    "true": (lambda s, b: so.frequency_response(s, (1, 2), harmonics=True), "whole number.*not True"),
     "load above": (
-        lambda s, b: so.frequency_response(harmonic_load(harmonic=5), (1, 2), 3),
+        lambda s, b: so.frequency_response(harmonic_load(harmonic=5), (1, 2), harmonics=3),
         "load at 5 omega needs harmonics=5 or more",
     ),
     "no step": (lambda s, b: so.frequency_response(s, (1, 2), max_step=0), "max_step must be a positive number"),
@@ -184,6 +187,6 @@ def test_misspelt_keyword(system):
 
 def test_numpy_numbers_are_numbers(system):
     curve = so.frequency_response(
-        system, np.array([3.0, 2.9]), np.int64(5), observe=np.int64(0), max_step=np.float64(0.02)
+        system, np.array([3.0, 2.9]), harmonics=np.int64(5), observe=np.int64(0), max_step=np.float64(0.02)
     )
     assert curve.omega[-1] == 2.9

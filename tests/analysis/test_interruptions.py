@@ -306,7 +306,7 @@ def test_a_search_for_subharmonics_gives_the_branches_that_it_has(ticks):
     system = so.System(1.0, 0.02, 1.0, [spring], [so.HarmonicLoad(0, 4.0)])
 
     def search(seconds):
-        return so.find_subharmonics(system, (4.0, 9.0), 3, seeds=so.Seeds(4, 3, 1), seconds=seconds)
+        return so.find_subharmonics(system, (4.0, 9.0), subharmonic=3, seeds=so.Seeds(4, 3, 1), seconds=seconds)
 
     looks = ticks.of(search)
     with pytest.raises(so.TimeLimitError):  # an empty list would say that there are none
@@ -324,10 +324,10 @@ def test_a_resonance_is_not_read_off_a_part_of_a_response(order, reach, ticks, m
         1.0, 0.02, 1.0, [so.PolynomialSpring(0, {3: 1.0})], [so.HarmonicLoad(0, "F")], parameters={"F": 4.0}
     )
     stage = "frequency_response" if order == 1 else "find_subharmonics"
-    verb, more = getattr(so, stage), {} if order == 1 else {"seeds": so.Seeds(4, 3, 1)}
+    verb, more = getattr(so, stage), {} if order == 1 else {"subharmonic": order, "seeds": so.Seeds(4, 3, 1)}
 
     def response(seconds):
-        return verb(system, reach, *([] if order == 1 else [order]), harmonics=3, seconds=seconds, **more)
+        return verb(system, reach, harmonics=3, seconds=seconds, **more)
 
     looks = ticks.of(response)
     for share in (0.8, 0.95):
@@ -341,10 +341,18 @@ def test_a_resonance_is_not_read_off_a_part_of_a_response(order, reach, ticks, m
     for share in (0.8, 0.95):
         ticks.now = 0.0
         with pytest.raises(so.TimeLimitError, match="before there was a result to keep"):
-            so.phase_resonance(system, "F", (1.0, 4.0), omega=reach, order=order, harmonics=3, seconds=share * looks)
+            so.phase_resonance(
+                system,
+                parameter="F",
+                bounds=(1.0, 4.0),
+                omega=reach,
+                subharmonic=order,
+                harmonics=3,
+                seconds=share * looks,
+            )
     monkeypatch.setattr(resonance, stage, part)
     with pytest.raises(KeyboardInterrupt):
-        so.phase_resonance(system, "F", (1.0, 4.0), omega=reach, order=order, harmonics=3)
+        so.phase_resonance(system, parameter="F", bounds=(1.0, 4.0), omega=reach, subharmonic=order, harmonics=3)
 
 
 # ------------------------------------------------------------------------------------------ starts, progress and turns

@@ -30,7 +30,7 @@ def van_der_pol():
     """With x = sqrt(mu) y that of van der Pol, mu (y^2 - 1) y'."""
     system = so.System.from_equations("x'' + (x**2 - mu)*x' + x = 0", {"mu": 0.1})
     rule = so.AdaptiveHarmonics(tolerance=1e-9, event_tolerance=1e-10, maximum=255)
-    return so.limit_cycles(hopf_of(system, "mu", (-0.5, 10.5)), (0.0, 10.0), harmonics=rule)
+    return so.limit_cycles(hopf_of(system, "mu", (-0.5, 10.5)), bounds=(0.0, 10.0), harmonics=rule)
 
 
 def test_the_period_of_van_der_pol(van_der_pol):
@@ -105,7 +105,7 @@ def test_the_limit_point_of_cycles_by_averaging_and_followed(rubbing):
     assert border.plane == ("a", "mu")
     assert "generalised Hopf (Bautin)" in border.ended
     assert border.stable.all()
-    again = so.sensitivity(fold, ["a"])
+    again = so.sensitivity(fold, by=["a"])
     sides = [so.limit_cycles(hopf_of(rubbing.with_parameters(a=0.1 + s * 1e-5), "mu", (-0.1, 0.1))) for s in (1, -1)]
     ahead, behind = (side.bifurcations["LP"][0].parameters["mu"] for side in sides)
     assert again["a"]["mu"] == pytest.approx((ahead - behind) / 2e-5, rel=1e-6)
@@ -140,9 +140,9 @@ def doubling():
         ["y'' - a*y' + y + z = 0", "eps*z'' + z' - b - z*(y' - a*y - c) = 0"],
         {"a": 0.2, "b": 0.2, "c": 2.0, "eps": 0.02},
     )
-    cycles = so.limit_cycles(hopf_of(system, "a", (-0.2, 0.3)), (-0.2, 0.4))
+    cycles = so.limit_cycles(hopf_of(system, "a", (-0.2, 0.3)), bounds=(-0.2, 0.4))
     near = cycles.points[int(np.argmin(np.abs(cycles.parameter("a") - 0.2)))]
-    return so.limit_cycles(near, (1.0, 4.0), "c")
+    return so.limit_cycles(near, bounds=(1.0, 4.0), parameter="c")
 
 
 def test_a_period_doubling_against_shooting_and_followed(doubling):
@@ -202,11 +202,11 @@ def test_from_a_response_to_a_small_load():
     system = so.System.from_equations("x'' + x + (x**2-mu)*x' = F*cos(omega*t)", {"mu": 0.5, "F": 0.05})
     response = so.frequency_response(system, (0.985, 1.03), start=[0.0, 1.4])
     point = response.points[int(np.argmax(response.amplitude))]
-    cycles = so.limit_cycles(point, (0.1, 2.0), "mu", unloaded=True)
+    cycles = so.limit_cycles(point, bounds=(0.1, 2.0), parameter="mu", unloaded=True)
     orbit = cycles.orbits[len(cycles) // 2]
     assert orbit.omega == pytest.approx(exact(orbit).omega, rel=1e-6)
     with pytest.raises(so.InputError, match="a load drives this system"):
-        so.limit_cycles(point, (0.1, 2.0), "mu")
+        so.limit_cycles(point, bounds=(0.1, 2.0), parameter="mu")
 
 
 def test_what_is_found_is_kept(tmp_path, doubling):
@@ -232,7 +232,7 @@ def test_wrong_use_is_refused(rubbing):
     with pytest.raises(so.InputError, match="give bounds="):
         so.limit_cycles(cycles.points[0], parameter="mu")
     with pytest.raises(so.InputError, match="did you mean 'mu'"):
-        so.limit_cycles(cycles.points[0], (0.0, 1.0), "mux")
+        so.limit_cycles(cycles.points[0], bounds=(0.0, 1.0), parameter="mux")
     buckled = so.System.from_equations("x'' + 0.1*x' - mu*x + x**3 = 0", {"mu": -0.5})
     point = so.equilibria(buckled, "mu", (-1.0, 1.0)).bifurcations["BP"][0]
     with pytest.raises(so.InputError, match="begins at Hopf points only: this is a BP"):

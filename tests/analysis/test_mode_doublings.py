@@ -23,7 +23,7 @@ def shaking(c=4.2, e=0.0, **more):
 
 
 def doubling(system, **options):
-    return so.nonlinear_mode(system, 2, amplitude=0.3, observe=1, **options).bifurcations["PD"][0]
+    return so.nonlinear_mode(system, mode=2, amplitude=0.3, observe=1, **options).bifurcations["PD"][0]
 
 
 def chain(whole=False, n=8, **parameters):
@@ -40,7 +40,7 @@ def chain(whole=False, n=8, **parameters):
 
 
 def of_chain(system):
-    return so.nonlinear_mode(system, 2, amplitude=(0.05, 0.75), harmonics=7).bifurcations["PD"][0]
+    return so.nonlinear_mode(system, mode=2, amplitude=(0.05, 0.75), harmonics=7).bifurcations["PD"][0]
 
 
 @pytest.fixture(scope="module")
@@ -123,14 +123,14 @@ def test_a_condensed_structure(name, bounds):
     ways = curves[0].parameter(name) - chain().parameters[name]
     slopes = np.gradient(curves[0].omega, curves[0].parameter(name))
     slope = np.interp(0.0, *(v[np.argsort(ways)] for v in (ways, slopes)))
-    assert so.sensitivity(of_chain(chain()), name)[name]["omega"] == pytest.approx(slope, rel=1e-2)
+    assert so.sensitivity(of_chain(chain()), by=name)[name]["omega"] == pytest.approx(slope, rel=1e-2)
 
 
 def test_its_extremum_in_a_third_parameter(tongue):
     """At the least quadratic part two doublings of a mode meet."""
     (turn,) = tongue.extrema
     assert (turn.parameter_name, turn.extreme) == ("a", "minimum")
-    low, high = (so.nonlinear_mode(chain(a=turn.parameters["a"] + s), 2, amplitude=(0.4, 0.9), harmonics=7)
+    low, high = (so.nonlinear_mode(chain(a=turn.parameters["a"] + s), mode=2, amplitude=(0.4, 0.9), harmonics=7)
                  for s in (-1e-4, 1e-4))  # fmt: skip
     assert [len(mode.bifurcations["PD"]) for mode in (low, high)] == [0, 2]
     turns = so.track(turn, "k", (-0.02, 0.02))
@@ -138,7 +138,7 @@ def test_its_extremum_in_a_third_parameter(tongue):
     k, a = turns.parameter("k")[-1], turns.parameter("a")[-1]
     there = so.track(of_chain(chain(k=k)), "a", (0.43, 0.6)).extrema[0]
     assert a == pytest.approx(there.parameters["a"], rel=1e-9)
-    slope, rates = so.sensitivity(turn, "k"), np.gradient(turns.parameter("a"), turns.parameter("k"))
+    slope, rates = so.sensitivity(turn, by="k"), np.gradient(turns.parameter("a"), turns.parameter("k"))
     assert slope["k"]["a"] == pytest.approx(rates[len(turns) // 2], rel=0.05)
 
 

@@ -34,7 +34,7 @@ def softening(a=0.5, damping=0.0):
 
 @pytest.fixture(scope="module")
 def mode():
-    return so.nonlinear_mode(coupled(), 1, amplitude=(1.0, 5.0), **TIGHT)
+    return so.nonlinear_mode(coupled(), mode=1, amplitude=(1.0, 5.0), **TIGHT)
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +53,7 @@ def test_the_equations_by_differences(mode, tongue):
     crossing, limit = mode.bifurcations["BP"][0], tongue.bifurcations["LP"][0]
     shaken = ["m*x'' + x + 2*x*y + 0.3*x**3 = 0", "y'' + c*y + x**2 + 0.5*y**3 = 0"]
     system = so.System.from_equations(shaken, {"c": 4.2, "m": 1.0})
-    doubling = so.nonlinear_mode(system, 2, amplitude=0.1, observe=1).bifurcations["PD"][0]
+    doubling = so.nonlinear_mode(system, mode=2, amplitude=0.1, observe=1).bifurcations["PD"][0]
     cases = ((crossing, "k"), (limit, "k"), (turn, "a"), (turn, "m"), (doubling, "c"), (doubling, "m"))
     for item, name in cases:
         curve, u = curve_through(item, so.HarmonicBasis(5), ("omega", name))
@@ -70,7 +70,7 @@ def test_the_equations_by_differences(mode, tongue):
 def test_branch_points_are_those_of_the_modes_there(crossings):
     for i in (2, len(crossings) // 3, len(crossings) // 2):
         k, size = crossings.parameter("k")[i], crossings.amplitude[i]
-        there = so.nonlinear_mode(coupled(k), 1, amplitude=(0.5 * size, 1.5 * size), **TIGHT)
+        there = so.nonlinear_mode(coupled(k), mode=1, amplitude=(0.5 * size, 1.5 * size), **TIGHT)
         found = min(there.bifurcations["BP"], key=lambda b: abs(b.omega - crossings.omega[i]))
         assert crossings.omega[i] == pytest.approx(found.omega, rel=1e-8)
         assert size == pytest.approx(found.amplitude, rel=1e-7)
@@ -89,7 +89,7 @@ def test_the_stiffness_that_makes_the_internal_resonance_vanish(crossings):
     # the tongue's other edge crosses at a smaller amplitude
     counts = []
     for share in (0.999, 1.001):
-        there = so.nonlinear_mode(coupled(share * last.parameter("k")), 1, amplitude=(1.4, 2.4))
+        there = so.nonlinear_mode(coupled(share * last.parameter("k")), mode=1, amplitude=(1.4, 2.4))
         counts.append(len(there.bifurcations["BP"]))
     assert counts == [2, 0]
     assert np.abs(crossings.damping_ratio).max() < 1e-9
@@ -103,7 +103,7 @@ def test_limit_points_are_those_of_the_tongues_there(tongue):
         # beside the two that are +1 by themselves two more
         assert np.abs(turns.points[i].floquet.multipliers - 1.0).max() < 2e-2
     for i in (0, len(turns) // 3, -1):
-        there = so.nonlinear_mode(coupled(turns.parameter("k")[i]), 1, amplitude=(2.0, 5.0), **TIGHT)
+        there = so.nonlinear_mode(coupled(turns.parameter("k")[i]), mode=1, amplitude=(2.0, 5.0), **TIGHT)
         found = so.switch_branch(there.bifurcations["BP"][0]).bifurcations["LP"]
         assert min(abs(b.omega / turns.omega[i] - 1.0) for b in found) < 1e-8
 
@@ -200,7 +200,7 @@ def test_a_mode_ends_where_it_meets_another_of_twice_its_frequency_and_goes_on_b
     assert np.abs(meeting.orbit.x[[1, 2, 5, 6]]).max() < 1e-9
     assert mode.points[-1].orbit.omega == pytest.approx(meeting.omega, abs=1e-12)
     assert so.verify(meeting).agrees
-    assert np.abs(so.switch_branch(meeting, 1).harmonic(1)).max() < 1e-6
+    assert np.abs(so.switch_branch(meeting, side=1).harmonic(1)).max() < 1e-6
     # the other mode has a second crossing, from which the first one goes on
     other = so.switch_branch(meeting)
     beyond = so.switch_branch(min(other.bifurcations["BP"], key=lambda item: item.omega))
@@ -210,7 +210,7 @@ def test_a_mode_ends_where_it_meets_another_of_twice_its_frequency_and_goes_on_b
 
 def test_where_a_contact_begins_to_touch_omega_of_a_mode_does_not_turn():
     stops = [so.ElasticStop(dof=0, stiffness=4.0, gap=0.26, side="right")]
+    system = so.System(np.eye(2), np.zeros((2, 2)), [[2, -1], [-1, 2]], stops)
     for max_step in (None, 0.04, 0.03, 0.02):
-        mode = so.nonlinear_mode(so.System(np.eye(2), np.zeros((2, 2)), [[2, -1], [-1, 2]], stops), 2, amplitude=1.0,
-                                 max_step=max_step)  # fmt: skip
+        mode = so.nonlinear_mode(system, mode=2, amplitude=1.0, max_step=max_step)
         assert not mode.bifurcations["extremum"]

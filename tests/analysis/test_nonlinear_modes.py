@@ -29,7 +29,7 @@ def two_masses(damping=0.0, **more):
 
 @pytest.fixture(scope="module")
 def lower():
-    return so.nonlinear_mode(two_masses(), 1, amplitude=(0.01, 5.0))
+    return so.nonlinear_mode(two_masses(), mode=1, amplitude=(0.01, 5.0))
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +53,7 @@ def test_duffing_over_six_decades_of_amplitude():
 
 def test_energy_and_action_of_a_family():
     """`dE = omega dJ`, and the energy is the same at all times."""
-    mode = so.nonlinear_mode(two_masses(), 2, energy=(1e-3, 20.0), **TIGHT)
+    mode = so.nonlinear_mode(two_masses(), mode=2, energy=(1e-3, 20.0), **TIGHT)
     assert mode.energy[[0, -1]] == pytest.approx([1e-3, 20.0], rel=1e-9)
     slopes = np.gradient(mode.energy, mode.action)[3:-3]
     assert slopes == pytest.approx(mode.omega[3:-3], rel=2e-3)
@@ -103,7 +103,7 @@ def test_the_tongue_leads_to_the_other_mode(lower, tongue):
     assert [event.kind for event in tongue.bifurcations] == ["BP", "LP", "BP", "LP", "BP"]
     assert np.abs(lower.harmonic(2)).max() < 1e-6
     assert np.abs(tongue.harmonic(2)).max() > 1.0
-    upper = so.nonlinear_mode(two_masses(), 2, amplitude=(1.0, 5.0))
+    upper = so.nonlinear_mode(two_masses(), mode=2, amplitude=(1.0, 5.0))
     met = [b for b in tongue.bifurcations["BP"] if abs(b.orbit.harmonic(1)) < 1e-3]
     assert len(met) == 2
     for item in met:
@@ -121,7 +121,7 @@ def test_the_tip_of_a_tongue_does_not_depend_on_rounding(tongue):
     assert tips[0] == pytest.approx(tips[1], rel=1e-9)
     for change in (-3e-13, -1e-13, 2e-13, 4e-13):
         system = so.System(np.eye(2), np.zeros((2, 2)), (1.0 + change) * STIFFNESS, elements=[so.CubicSpring(0, 0.5)])
-        (crossing,) = so.nonlinear_mode(system, 1, amplitude=(0.01, 5.0)).bifurcations["BP"]
+        (crossing,) = so.nonlinear_mode(system, mode=1, amplitude=(0.01, 5.0)).bifurcations["BP"]
         again = so.switch_branch(crossing)
         assert [event.kind for event in again.bifurcations] == ["BP", "LP", "BP", "LP", "BP"]
         assert [again.bifurcations[i].omega for i in (0, -1)] == pytest.approx(tips, rel=1e-9)
@@ -129,7 +129,9 @@ def test_the_tip_of_a_tongue_does_not_depend_on_rounding(tongue):
 
 def mode_of_a_chain(n, element, amplitude):
     mass, stiffness = (matrix.toarray() for matrix in chain_matrices(n))
-    return so.nonlinear_mode(so.System(mass, np.zeros((n, n)), stiffness, elements=[element]), 2, amplitude=amplitude)
+    return so.nonlinear_mode(
+        so.System(mass, np.zeros((n, n)), stiffness, elements=[element]), mode=2, amplitude=amplitude
+    )
 
 
 def test_pairs_pass_minus_one_on_the_circle():
@@ -161,7 +163,7 @@ def test_every_motion_of_a_tongue_is_one(tongue):
 def test_a_period_doubling_of_a_mode():
     """y alone is linear and pumps x at twice its frequency: the border of Mathieu's first region."""
     system = so.System.from_equations(["x'' + x + 2*x*y = 0", "y'' + 4.2*y + x**2 = 0"])
-    mode = so.nonlinear_mode(system, 2, amplitude=0.2, observe=1)
+    mode = so.nonlinear_mode(system, mode=2, amplitude=0.2, observe=1)
     (doubling,) = mode.bifurcations["PD"]
     # x'' + (1 + 2 A cos(2 w t)) x = 0 with x of frequency w, by two harmonics and more of Hill's determinant
     w = 0.5 * np.sqrt(4.2)
@@ -187,7 +189,7 @@ def test_damping_of_linear_modes_is_exact():
     assert one.forcing() == pytest.approx(0.12 * one.omega * one.amplitude, rel=1e-9)
     linear = so.System(np.eye(2), 0.02 * STIFFNESS, STIFFNESS)
     for number, omega in ((1, 1.0), (2, np.sqrt(3.0))):
-        mode = so.nonlinear_mode(linear, number, amplitude=(0.1, 1.0))
+        mode = so.nonlinear_mode(linear, mode=number, amplitude=(0.1, 1.0))
         assert mode.damping_ratio == pytest.approx(np.full(len(mode), 0.01 * omega), rel=1e-9)
 
 
@@ -207,7 +209,7 @@ def test_phase_resonance_is_a_mode_but_for_the_square_of_damping():
     apart = []
     for zeta in (0.08, 0.04, 0.02):
         system = so.library.duffing(c=2.0 * zeta, alpha=1.0, F=3.0 * zeta)
-        forced = so.phase_resonance(system, "F", (zeta, 5.0 * zeta), omega=(0.7, 4.0), harmonics=15)
+        forced = so.phase_resonance(system, parameter="F", bounds=(zeta, 5.0 * zeta), omega=(0.7, 4.0), harmonics=15)
         found = []
         for i in (0, len(forced) // 2, -1):
             size = float(forced.amplitude[i])
@@ -226,7 +228,7 @@ def test_forcing_of_several_masses():
         loaded = so.System(
             np.eye(2), 0.01 * STIFFNESS, STIFFNESS, [so.CubicSpring(0, 0.5)], [so.HarmonicLoad(at, "F")], {"F": 0.01}
         )
-        forced = so.phase_resonance(loaded, "F", (0.002, 0.02), omega=(0.9, 1.3), observe=at)
+        forced = so.phase_resonance(loaded, parameter="F", bounds=(0.002, 0.02), omega=(0.9, 1.3), observe=at)
         mode = so.nonlinear_mode(damped, amplitude=(0.05, 1.05 * forced.amplitude.max()), observe=at)
         load = np.interp(forced.amplitude, mode.amplitude, mode.forcing(at))
         assert load[forced.amplitude > 0.1] == pytest.approx(forced.parameter("F")[forced.amplitude > 0.1], rel=2e-2)
@@ -255,7 +257,7 @@ def test_gyroscopic_coupling_takes_no_energy():
     g, springs = 0.4, [so.CubicSpring(0, 1.0), so.CubicSpring(1, 1.0)]
     system = so.System(np.eye(2), [[0.0, -g], [g, 0.0]], np.eye(2), springs)
     for number, side in ((1, -1.0), (2, 1.0)):
-        mode = so.nonlinear_mode(system, number, amplitude=(1e-3, 1.0))
+        mode = so.nonlinear_mode(system, mode=number, amplitude=(1e-3, 1.0))
         assert not mode.damped
         assert mode.omega[0] == pytest.approx(np.sqrt(1.0 + g**2 / 4.0) + side * g / 2.0, rel=1e-5)
         assert np.abs(mode.damping_ratio).max() < 1e-9
@@ -283,7 +285,7 @@ def test_a_condensed_structure_has_its_mass(damped):
         so.System(np.eye(n), 0.05 * chain, chain, [so.CubicSpring(0, 1.0), *more])
         for more in ([], [so.CubicSpring(i, 1e-300) for i in range(1, n)])
     )
-    curves = [so.nonlinear_mode(one, 2, amplitude=(0.05, 0.5), harmonics=7, damped=damped) for one in (few, whole)]
+    curves = [so.nonlinear_mode(one, mode=2, amplitude=(0.05, 0.5), harmonics=7, damped=damped) for one in (few, whole)]
     assert [curve.orbits[0].balance.size for curve in curves] == [1, n]
     for name in ("omega", "energy", "action", "modal_amplitude", "damping_ratio"):
         one, other = (getattr(curve, name)[-1] for curve in curves)
@@ -401,11 +403,11 @@ def test_the_page_says_what_it_prints(capsys, tmp_path, monkeypatch):
 def test_motions_of_modes_against_shooting(tmp_path):
     stiffness = np.array([[2.0, -1.0], [-1.0, 2.0]])
     spring = [so.CubicSpring(0, 0.5)]
-    mode = so.nonlinear_mode(so.System(np.eye(2), np.zeros((2, 2)), stiffness, spring), 1, amplitude=(0.01, 3.0))
+    mode = so.nonlinear_mode(so.System(np.eye(2), np.zeros((2, 2)), stiffness, spring), mode=1, amplitude=(0.01, 3.0))
     for item in (mode.points[len(mode) // 2], mode.points[-1], mode.bifurcations["BP"][0]):
         assert so.verify(item).agrees
     so.plot(mode, tmp_path / "mode.png", quantity="energy")
-    damped = so.nonlinear_mode(so.System(np.eye(2), 0.02 * stiffness, stiffness, spring), 1, amplitude=(0.01, 1.0))
+    damped = so.nonlinear_mode(so.System(np.eye(2), 0.02 * stiffness, stiffness, spring), mode=1, amplitude=(0.01, 1.0))
     with pytest.raises(so.InputError, match="the motion of no system that stands by itself"):
         so.verify(damped.points[-1])
     assert not so.stability(damped.points[-1]).applicable
@@ -415,8 +417,8 @@ def test_an_observed_degree_of_freedom_that_rests_in_the_mode():
     stiffness = np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 2.0]])
     system = so.System(np.eye(3), np.zeros((3, 3)), stiffness, [so.CubicSpring(i, 1.0) for i in range(3)], [], {})
     with pytest.raises(so.InputError, match="rests in this mode"):
-        so.nonlinear_mode(system, 2, amplitude=1.0, observe=1)
-    assert len(so.nonlinear_mode(system, 2, amplitude=0.1, observe=0)) > 2
+        so.nonlinear_mode(system, mode=2, amplitude=1.0, observe=1)
+    assert len(so.nonlinear_mode(system, mode=2, amplitude=0.1, observe=0)) > 2
 
 
 @pytest.mark.parametrize("n", [30, 60])
@@ -424,11 +426,11 @@ def test_a_damped_mode_whose_spring_moves_little(n):
     """Beside a wall, a hundredth of what moves elsewhere: what damping does there is nothing small to first order."""
     stiffness = (n / 3.0) ** 2 * (2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1))
     system = so.System(np.eye(n), 0.02 * np.eye(n) + 0.001 * stiffness, stiffness, [so.CubicSpring(n - 1, 1.0)])
-    mode = so.nonlinear_mode(system, 1, amplitude=(0.01, 0.3))
+    mode = so.nonlinear_mode(system, mode=1, amplitude=(0.01, 0.3))
     w = 2.0 * n / 3.0 * np.sin(0.5 * np.pi / (n + 1))
     assert mode.omega[0] == pytest.approx(w, rel=1e-5)
     assert mode.damping_ratio[0] == pytest.approx(0.01 / w + 0.0005 * w, rel=1e-4)
-    free = so.nonlinear_mode(system, 1, amplitude=(0.01, 0.3), damped=False)
+    free = so.nonlinear_mode(system, mode=1, amplitude=(0.01, 0.3), damped=False)
     assert mode.omega[-1] == pytest.approx(free.omega[-1], rel=1e-6)
 
 
@@ -436,7 +438,7 @@ def test_a_page_takes_the_multipliers_of_a_conserved_energy_for_what_they_are():
     """Energy and phase make two multipliers +1, and pairs of the others stay on the unit circle: no verdict is open."""
     system = so.System(np.eye(2), np.zeros((2, 2)), [[2.0, -1.0], [-1.0, 2.0]], [so.CubicSpring(0, 0.5)])
     for mode in (1, 2):
-        curve = so.nonlinear_mode(system, mode, amplitude=(0.05, 0.8))
+        curve = so.nonlinear_mode(system, mode=mode, amplitude=(0.05, 0.8))
         assert (np.abs(np.abs(curve.multipliers) - 1.0) <= curve.multiplier_errors).any(axis=1).all()
         assert not curve.multiplier_open.any()
         assert not notes_on(curve.to_xarray())

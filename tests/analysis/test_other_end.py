@@ -24,13 +24,15 @@ def amplitudes(omega):
 
 def test_options_in_the_message():
     stepping = so.SteppingOptions(max_step=0.05)
-    curve = so.frequency_response(softening(), RANGE, so.AdaptiveHarmonics(minimum=3), stepping=stepping, events=())
+    curve = so.frequency_response(
+        softening(), RANGE, harmonics=so.AdaptiveHarmonics(minimum=3), stepping=stepping, events=()
+    )
     assert f"harmonics=so.{so.AdaptiveHarmonics(minimum=3)!r}, stepping=so.{stepping!r})" in curve.warnings[-1]
 
 
 def test_a_diagram_goes_on_from_the_other_end(tmp_path):
     """All three motions of the closed form at the end where it began, in the file, too."""
-    diagram = so.bifurcation_diagram(softening(), RANGE, 1, harmonics=1)
+    diagram = so.bifurcation_diagram(softening(), RANGE, depth=1, harmonics=1)
     assert len(diagram) == len(diagram.responses) == 2
     first, other = diagram.responses
     assert [node.number for node in diagram] == [0, 1]
@@ -44,11 +46,11 @@ def test_a_diagram_goes_on_from_the_other_end(tmp_path):
     assert [node.depth for node in again] == [0, 0]
     assert again[1].origin is None
     # a motion that its user has chosen stands alone
-    assert len(so.bifurcation_diagram(softening(), RANGE, 1, harmonics=1, start=first.orbits[0])) == 1
+    assert len(so.bifurcation_diagram(softening(), RANGE, depth=1, harmonics=1, start=first.orbits[0])) == 1
 
 
 def test_a_response_that_runs_through_is_alone():
-    assert len(so.bifurcation_diagram(softening(), (1.3, 0.5), 1, harmonics=1).responses) == 1
+    assert len(so.bifurcation_diagram(softening(), (1.3, 0.5), depth=1, harmonics=1).responses) == 1
 
 
 def test_parametric_excitation_folds_back_too():
@@ -72,7 +74,7 @@ def test_parametric_excitation_folds_back_too():
     curves = []
     for guess in guesses:
         try:
-            curves.append(so.frequency_response(system, (w, 2.0), 1, start=guess))
+            curves.append(so.frequency_response(system, (w, 2.0), harmonics=1, start=guess))
         except so.ConvergenceError:
             continue
     curve = max(curves, key=lambda found: found.amplitude[0])

@@ -226,7 +226,7 @@ def test_in_a_study_file(tmp_path):
     path.write_text(STUDY, encoding="utf-8")
     study = read_study(path)
     curve = run_study(study).finished[1].result
-    response = so.frequency_response(study.system, (0.7, 2.0), 3)
+    response = so.frequency_response(study.system, (0.7, 2.0), harmonics=3)
     script = so.track(peak(response), "F", (0.05, 0.2), onto="phase_resonance")
     np.testing.assert_array_equal(curve.omega, script.omega)
 

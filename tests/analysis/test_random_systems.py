@@ -84,7 +84,7 @@ def test_torus_points_on_either_side_of_a_limit_point(systems: ModuleType) -> No
     system = systems.system_of(systems.describe(316, strong=False))
     start = [16.2246, 17.4699, 27.6108, 34.0901, 9.79169, 5.07098, 17.2087, 20.8257]
     enough, first_points = so.AdaptiveHarmonics(minimum=63), so.SteppingOptions(max_points=12)
-    branch = so.frequency_response(system, (0.34054, 0.746), enough, start=start, stepping=first_points)
+    branch = so.frequency_response(system, (0.34054, 0.746), harmonics=enough, start=start, stepping=first_points)
     assert [item.kind for item in branch.bifurcations] == ["NS", "LP", "NS"]
     # by so.timedomain.locate_by_shooting
     shot = [0.34056960105526, 0.34056981342756, 0.34056977974450]

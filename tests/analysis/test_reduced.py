@@ -22,7 +22,7 @@ def test_a_model_in_all_its_modes_is_the_same_model():
         [so.CubicSpring(direction=modes[N - 1], coefficient=0.1)],
         [so.HarmonicLoad(direction=modes[0], amplitude=0.2)],
     )
-    one, other = (so.frequency_response(system, (0.7, 0.4), 3) for system in (whole, in_modes))
+    one, other = (so.frequency_response(system, (0.7, 0.4), harmonics=3) for system in (whole, in_modes))
     folds = [b.omega for b in one.bifurcations["LP"]]
     assert len(folds) == 2
     assert [b.omega for b in other.bifurcations["LP"]] == pytest.approx(folds, rel=1e-9)
@@ -36,4 +36,4 @@ def test_too_many_unknowns_are_refused_with_what_can_be_done():
     stiffness = 2.0 * np.eye(many) - np.eye(many, k=1) - np.eye(many, k=-1)
     system = so.System(np.eye(many), 0.01 * stiffness, stiffness, [], [so.HarmonicLoad(0, 1.0)])
     with pytest.raises(so.InputError, match=r"keep fewer harmonics, or reduce the model .* direction=P\[dof\]"):
-        so.frequency_response(system, (0.5, 0.6), 15, linear=StructuralMatrices(system))
+        so.frequency_response(system, (0.5, 0.6), harmonics=15, linear=StructuralMatrices(system))

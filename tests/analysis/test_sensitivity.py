@@ -95,10 +95,10 @@ def test_a_table_shows_the_strongest_first():
 def test_what_has_none_is_refused():
     branch = so.frequency_response(OSCILLATOR, (2.4, 1.6), harmonics=7)
     item = branch.bifurcations["PD"][0]
-    for given, words in (
-        ((branch,), "bifurcation must be a Bifurcation, not Branch"),
-        ((item, ["zetta"]), "did you mean 'zeta'"),
-        ((item, ["omega"]), "omega is free"),
+    for of, by, words in (
+        (branch, "zeta", "bifurcation must be a Bifurcation, not Branch"),
+        (item, ["zetta"], "did you mean 'zeta'"),
+        (item, ["omega"], "omega is free"),
     ):
         with pytest.raises(so.InputError, match=words):
-            so.sensitivity(*given)
+            so.sensitivity(of, by=by)

@@ -53,10 +53,10 @@ def test_the_method_is_that_of_points_and_bifurcations(rattling, default, method
     assert [b.omega for b in curve.bifurcations] == pytest.approx([b.omega for b in default.bifurcations], abs=1e-9)
     assert set(curve.stability_methods) == {written}
     for point in [*curve.points[::20], *curve.bifurcations]:
-        alone = so.stability(point, method)
+        alone = so.stability(point, method=method)
         np.testing.assert_allclose(point.floquet.multipliers, alone.multipliers, rtol=1e-9)
         np.testing.assert_allclose(point.floquet.errors, alone.errors, rtol=1e-4, atol=1e-12)
-        other = so.stability(point, "monodromy")
+        other = so.stability(point, method="monodromy")
         mine, its = np.sort_complex(alone.multipliers), np.sort_complex(other.multipliers)
         assert np.all(np.abs(mine - its) <= alone.error + other.error)
     for point in curve.points[::20]:
@@ -106,7 +106,7 @@ def test_where_hill_says_nothing_the_monodromy_matrix_stands_in():
     system = so.System(
         np.eye(2), 0.04 * np.eye(2), np.diag([4.0, 64.0]), [so.CubicSpring(0, 0.1)], [so.HarmonicLoad(0, 0.5)]
     )
-    curve = so.frequency_response(system, (3.6, 2.9), 5, stability="hill")
+    curve = so.frequency_response(system, (3.6, 2.9), harmonics=5, stability="hill")
     said = np.array([method == "Hill" for method in curve.stability_methods])
     np.testing.assert_array_equal(said, curve.omega > 3.2)
     assert np.isfinite(curve.multipliers).all()
@@ -177,7 +177,7 @@ def test_witnesses_are_not_asked_for_ever(rattling):
             asked.append(state.omega)
             return found
 
-    curve = so.frequency_response(rattling, (4.5, 4.2), 15, stability=Vain(10.0))
+    curve = so.frequency_response(rattling, (4.5, 4.2), harmonics=15, stability=Vain(10.0))
     assert len(curve) > 5
     assert len(asked) == 3
     assert asked == curve.omega[:3].tolist()
@@ -187,7 +187,7 @@ def test_witnesses_are_not_asked_for_ever(rattling):
 
 def test_undamped_motions_are_said_to_be_once():
     system = so.System(1.0, 0.0, 1.0, [so.CubicSpring(0, 1.0)], [so.HarmonicLoad(0, 0.1)])
-    curve = so.frequency_response(system, (0.3, 0.5), 9)
+    curve = so.frequency_response(system, (0.3, 0.5), harmonics=9)
     (note,) = curve.warnings
     assert "between omega = 0.3 and 0.5 the motion is undamped" in note
     assert curve.audit.complete
@@ -202,7 +202,7 @@ def test_another_multiplier_on_the_circle_beside_a_bifurcation():
     springs = [so.CubicSpring(0, 1.0), so.CubicSpring(1, 1.0)]
     system = so.System(np.eye(2), np.diag([0.1, 1e-9]), np.diag([1.0, 2.0]), springs, [so.HarmonicLoad(0, 0.3)])
     for method, said in (("monodromy", True), (None, False)):
-        curve = so.frequency_response(system, (1.9, 1.2), 11, stability=method)
+        curve = so.frequency_response(system, (1.9, 1.2), harmonics=11, stability=method)
         assert len(curve.bifurcations["LP"]) == 2
         for fold in curve.bifurcations["LP"]:
             begins = f"at the LP at omega = {fold.omega:.9g} another multiplier"

@@ -78,7 +78,7 @@ def test_a_parametrically_excited_mass_before_a_stop_stands_still():
 
 def test_a_limit_point_at_which_a_branch_begins_is_none_of_these():
     system = so.System(1.0, 0.1, 1.0, [so.CubicSpring(0, 1.0)], [so.HarmonicLoad(0, 1.0)])
-    curve = so.frequency_response(system, (0.7, 6.0), 5)
+    curve = so.frequency_response(system, (0.7, 6.0), harmonics=5)
     fold = curve.bifurcations["LP"][0]
     again = so.continue_branch(fold.orbit, "omega", (0.7, 6.0))
     np.testing.assert_allclose([b.omega for b in again.bifurcations["LP"]], [b.omega for b in curve.bifurcations["LP"]])

@@ -40,7 +40,7 @@ def test_a_path_takes_over_where_newton_fails(paths):
     for omega in (0.3, 0.6, 1.0, 1.3):
         paths.clear()
         system = so.library.reference_oscillator(Kc=50.0, p=1.7)
-        orbit = so.frequency_response(system, (omega, omega * 1.001), 63).orbits[0]
+        orbit = so.frequency_response(system, (omega, omega * 1.001), harmonics=63).orbits[0]
         used += bool(paths)
         assert orbit.amplitude() == pytest.approx(shoot(system, orbit.start(), omega).amplitude, rel=1e-3)
     assert used >= 1
@@ -224,7 +224,7 @@ def test_impossible_start_says_what_was_tried():
 def hardening():
     """A Duffing oscillator that folds at omega = 2.3996 and 1.3292, and its response."""
     system = so.System(1.0, 0.05, 1.0, [so.CubicSpring(0, 1.0)], [so.HarmonicLoad(0, 0.3)])
-    return system, so.frequency_response(system, (0.5, 3.5), 5)
+    return system, so.frequency_response(system, (0.5, 3.5), harmonics=5)
 
 
 def test_a_motion_from_elsewhere_starts_no_curve_outside_the_range(hardening):
@@ -232,7 +232,7 @@ def test_a_motion_from_elsewhere_starts_no_curve_outside_the_range(hardening):
     (system, response), bounds, refused = hardening, (1.2, 0.8), 0
     for start in response.orbits[::6]:
         try:
-            curve = so.frequency_response(system, bounds, 5, start=start)
+            curve = so.frequency_response(system, bounds, harmonics=5, start=start)
         except so.ConvergenceError as failure:
             refused += "the nearest one lies at omega" in str(failure)
             continue
@@ -245,9 +245,9 @@ def test_the_nearest_motion_in_the_range_is_said_to_be_no_start(hardening):
     """A motion of a stronger load at 2.7: beside it the large ones of the weaker load end at 2.3996, in the range."""
     system, _ = hardening
     strong = so.System(1.0, 0.05, 1.0, [so.CubicSpring(0, 1.0)], [so.HarmonicLoad(0, 0.5)])
-    high = so.frequency_response(strong, (0.5, 2.7), 5)
+    high = so.frequency_response(strong, (0.5, 2.7), harmonics=5)
     start = high.orbits[int(np.argmax(high.amplitude * (high.omega <= 2.7)))]
-    curve = so.frequency_response(system, (2.7, 0.8), 5, start=start)
+    curve = so.frequency_response(system, (2.7, 0.8), harmonics=5, start=start)
     assert curve.omega.max() <= 2.7
     elsewhere = bool(abs(curve.omega[0] - 2.7) > 1e-3)
     assert any("the curve begins at the nearest one" in note for note in curve.warnings) is elsewhere

@@ -50,7 +50,7 @@ def test_the_2T_branch_leads_from_either_doubling_to_the_other(weak, reference, 
 
 def test_both_signs_of_the_null_vector_give_the_same_motions(weak):
     """Shifted by one period of the parent."""
-    one, other = (so.switch_branch(weak.bifurcations["PD"][0], side).orbits[20] for side in (1, -1))
+    one, other = (so.switch_branch(weak.bifurcations["PD"][0], side=side).orbits[20] for side in (1, -1))
     t = np.linspace(0.0, one.period, 50)
     np.testing.assert_allclose(one.displacement(t), other.displacement(t + one.period / 2), atol=1e-9)
 
@@ -169,7 +169,7 @@ def symmetric():
 def test_the_mirror_branches_of_a_symmetric_oscillator(symmetric):
     """Their halves are each other's mirror images, -x(t + T / 2), and lead from one branch point to the other."""
     first, last = symmetric.bifurcations["BP"]
-    halves = [so.switch_branch(first, side) for side in (1, -1)]
+    halves = [so.switch_branch(first, side=side) for side in (1, -1)]
     for half in halves:
         assert half.departs.omega == first.omega
         assert half.arrives.omega == pytest.approx(last.omega, abs=1e-7)

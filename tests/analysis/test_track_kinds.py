@@ -146,7 +146,7 @@ def test_grazing_of_a_linear_oscillator():
 @pytest.mark.parametrize("turns", [-1, 0, 1])
 def test_an_instant_is_compared_on_the_circle(turns):
     """A curve of grazings of 2T motions, begun a load period later: the same curve, whatever the instant is called."""
-    response = so.frequency_response(so.library.reference_oscillator(p=0.55), (4.5, 1.3), 9)
+    response = so.frequency_response(so.library.reference_oscillator(p=0.55), (4.5, 1.3), harmonics=9)
     touch = so.switch_branch(response.bifurcations["PD"][0]).grazings[0]
     system, newton = touch.orbit.system, NewtonOptions()
     bounds = (0.3, 0.8)
@@ -246,7 +246,7 @@ def test_tori_by_shooting(absorber):
     ("harmonics", "tolerance"), [(15, None), pytest.param("adaptive", 1e-3, marks=pytest.mark.slow)]
 )
 def test_fold_flips_from_both_curves_through_them(harmonics, tolerance):
-    curve = so.frequency_response(so.library.two_mass_unilateral(), (0.6, 0.8), harmonics).bifurcations
+    curve = so.frequency_response(so.library.two_mass_unilateral(), (0.6, 0.8), harmonics=harmonics).bifurcations
     folds = so.track(curve["LP"][0], "F", (0.07, 0.12))
     flips = so.track(curve["PD"][1], "F", (0.06, 0.12), max_step=0.2)
     (a,), (b,) = folds.bifurcations["LPPD"], flips.bifurcations["LPPD"]

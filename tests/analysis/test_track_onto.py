@@ -115,7 +115,7 @@ def test_a_one_to_two_resonance_by_shooting():
     def monodromy(orbit):
         return shoot(orbit.system, orbit.start(), orbit.omega).monodromy
 
-    doublings = so.track(so.frequency_response(system, (1.6, 2.6), 7).bifurcations["PD"][0], "F", (0.5, 2.0))
+    doublings = so.track(so.frequency_response(system, (1.6, 2.6), harmonics=7).bifurcations["PD"][0], "F", (0.5, 2.0))
     (event,) = doublings.bifurcations["R2"]
     there = monodromy(event.orbit)
     assert (np.trace(there), np.linalg.det(there)) == pytest.approx((-2.0, 1.0), abs=1e-8)
@@ -157,7 +157,7 @@ def test_a_one_to_two_resonance_from_both_sides():
 
 
 def test_fold_flips_lead_onto_the_other_curve():
-    curve = so.frequency_response(so.library.two_mass_unilateral(), (0.6, 0.8), 15).bifurcations
+    curve = so.frequency_response(so.library.two_mass_unilateral(), (0.6, 0.8), harmonics=15).bifurcations
     folds = so.track(curve["LP"][0], "F", (0.07, 0.12))
     (event,) = folds.bifurcations["LPPD"]
     flips = so.track(event, "F", (0.06, 0.12))
@@ -175,7 +175,10 @@ def test_refusals(limits, tori):
         so.track(event, "F", LOADS, onto="PD")
     with pytest.raises(InputError, match="this is a LP"):
         so.track(
-            so.frequency_response(so.library.duffing(F=0.1), (0.7, 2.0), 3).bifurcations["LP"][0], "F", LOADS, onto="LP"
+            so.frequency_response(so.library.duffing(F=0.1), (0.7, 2.0), harmonics=3).bifurcations["LP"][0],
+            "F",
+            LOADS,
+            onto="LP",
         )
     (cusp,) = limits.bifurcations["CP"]
     with pytest.raises(InputError, match="this is a CP"):

@@ -56,13 +56,15 @@ def shot(event):
 
 def torus_alone(stiffness, omega, load):
     """Distance of the self-excited oscillator alone from its nearest Neimark-Sacker point over omega."""
-    found = so.frequency_response(self_excited(stiffness, load), (omega - 0.05, omega + 0.05), 5).bifurcations["NS"]
+    found = so.frequency_response(
+        self_excited(stiffness, load), (omega - 0.05, omega + 0.05), harmonics=5
+    ).bifurcations["NS"]
     return min(abs(b.omega - omega) for b in found)
 
 
 def test_fold_neimark_sacker_of_two_oscillators_that_do_not_know_each_other():
     """It is where the limit points of one, in closed form, have the load of the other's tori."""
-    response = so.frequency_response(duffing_and_self_excited(), (0.9, 1.6), 1)
+    response = so.frequency_response(duffing_and_self_excited(), (0.9, 1.6), harmonics=1)
     tori = so.track(response.bifurcations["NS"][0], "F", (0.05, 0.5), omega=(0.5, 3.0))
     events = tori.bifurcations["LPNS"]
     assert len(events) == 2
@@ -73,13 +75,13 @@ def test_fold_neimark_sacker_of_two_oscillators_that_do_not_know_each_other():
         assert stiff**2 + (0.05 * omega) ** 2 + 1.5 * square * stiff == pytest.approx(0.0, abs=1e-8)
         # one harmonic does, without the cubic damping's third
         alone = so.frequency_response(
-            self_excited(2.89, event.parameter("F")), (omega - 0.05, omega + 0.05), 1
+            self_excited(2.89, event.parameter("F")), (omega - 0.05, omega + 0.05), harmonics=1
         ).bifurcations["NS"]
         assert min(abs(b.omega - omega) for b in alone) < 1e-8
 
 
 def test_fold_neimark_sacker_from_both_curves_and_by_shooting():
-    response = so.frequency_response(duffing_and_self_excited(0.02), (0.9, 1.6), 7)
+    response = so.frequency_response(duffing_and_self_excited(0.02), (0.9, 1.6), harmonics=7)
     tori = so.track(response.bifurcations["NS"][0], "F", (0.05, 0.5), omega=(0.5, 2.0))
     assert tori.bifurcations["LPNS"]
     event = tori.bifurcations["LPNS"][0]
@@ -96,7 +98,7 @@ def test_fold_neimark_sacker_from_both_curves_and_by_shooting():
 
 
 def test_flip_neimark_sacker_from_both_curves_and_by_shooting():
-    response = so.frequency_response(mathieu_and_self_excited(), (1.7, 2.3), 5)
+    response = so.frequency_response(mathieu_and_self_excited(), (1.7, 2.3), harmonics=5)
     tongue = so.track(response.bifurcations["PD"][0], "eps", (0.05, 0.6))
     tori = so.track(response.bifurcations["NS"][0], "eps", (0.05, 0.6))
     found = places(tongue.bifurcations["PDNS"], "eps")
@@ -117,7 +119,7 @@ def test_a_pitchfork_takes_the_place_of_limit_points():
     """A symmetric Duffing oscillator's branch points; the equations of a limit point are singular along them."""
     elements = [so.CubicSpring(dof=0, coefficient=1.0), so.Expression(dof=1, expression=VAN_DER_POL)]
     system = two((1.0, 4.84), (0.1, "-e"), elements, {0: "F", 1: "0.152*F"}, F=6.0)
-    response = so.frequency_response(system, (1.6, 1.2), 7)
+    response = so.frequency_response(system, (1.6, 1.2), harmonics=7)
     (event,) = so.track(response.bifurcations["NS"][0], "F", (4.0, 7.0)).bifurcations["LPNS"]
     assert np.abs(shot(event) - 1.0).min() < 1e-2
     curve = so.track(event, "F", (4.0, 7.0))
@@ -130,7 +132,7 @@ def test_double_neimark_sacker_and_a_curve_through_half_the_frequency():
     """With a half-wave symmetry two multipliers pass each other at -1: no 1:2 resonance, and no end."""
     elements = [so.Expression(dof=dof, expression=VAN_DER_POL) for dof in (0, 1)]
     system = two((0.3, 2.89), ("-e", "-e"), elements, {0: "F", 1: "F"}, F=0.25)
-    response = so.frequency_response(system, (0.8, 1.6), 5)
+    response = so.frequency_response(system, (0.8, 1.6), harmonics=5)
     curves = [so.track(start, "F", (0.05, 0.6)) for start in response.bifurcations["NS"]]
     (one,), (other,) = (curve.bifurcations["NSNS"] for curve in curves)
     assert (one.omega, one.parameter("F")) == pytest.approx((other.omega, other.parameter("F")), abs=1e-8)
@@ -157,7 +159,7 @@ def test_a_neutral_saddle_is_no_torus():
 @pytest.mark.parametrize("load", ["7.15*eps", "7.2*eps"])
 def test_two_events_within_one_step(load):
     """The tori's curve just cuts the tip of the tongue: det J_half has the same sign at both ends of the step."""
-    response = so.frequency_response(mathieu_and_self_excited(load), (1.7, 2.6), 3)
+    response = so.frequency_response(mathieu_and_self_excited(load), (1.7, 2.6), harmonics=3)
     start = response.bifurcations["NS"][0]
     expected = places(so.track(start, "eps", (0.05, 0.6), max_step=0.02).bifurcations["PDNS"], "eps")
     assert len(expected) == 2
@@ -171,7 +173,7 @@ def test_two_events_within_one_step(load):
 
 
 def test_a_curve_that_misses_the_tip():
-    response = so.frequency_response(mathieu_and_self_excited("7.4*eps"), (1.7, 2.6), 3)
+    response = so.frequency_response(mathieu_and_self_excited("7.4*eps"), (1.7, 2.6), harmonics=3)
     for max_step in (None, 0.5):
         tori = so.track(response.bifurcations["NS"][0], "eps", (0.05, 0.6), max_step=max_step)
         assert not tori.bifurcations["PDNS"]
@@ -185,7 +187,7 @@ def test_coefficients_that_are_not_linear_in_the_parameter():
         stop = so.ElasticStop(0, stiffness=4.0, gap=gap, side="right", regularization=300.0)
         loads, values = [so.HarmonicLoad(0, "p")], {"g": 0.0225, "r": 0.15, "p": 0.5}
         system = so.System(1.0, 0.06, 1.0, [stop], loads, {gap[0]: values[gap[0]], "p": values["p"]})
-        item = so.frequency_response(system, (4.5, 1.3), 15).bifurcations["PD"][0]
+        item = so.frequency_response(system, (4.5, 1.3), harmonics=15).bifurcations["PD"][0]
         curve = so.track(item, gap[0], bounds)
         found.append(curve)
     for end in (0, -1):

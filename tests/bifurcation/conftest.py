@@ -30,7 +30,7 @@ def oscillator_curve():
     @cache
     def curve(p, j=0.0, regularization=None, omega=(4.5, 1.25), harmonics="adaptive", max_step=None):
         system = so.library.reference_oscillator(p=p, j=j, regularization=regularization)
-        return so.frequency_response(system, omega, harmonics, max_step=max_step)
+        return so.frequency_response(system, omega, harmonics=harmonics, max_step=max_step)
 
     return curve
 

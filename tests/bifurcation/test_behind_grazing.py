@@ -37,7 +37,7 @@ def oscillator(Kc, zeta, share, length=1.0, time=1.0, regularization=None):
 
 
 def first_fold(system, omega=(1.3, 0.95), harmonics="adaptive", **options):
-    curve = so.frequency_response(system, omega, harmonics, **options)
+    curve = so.frequency_response(system, omega, harmonics=harmonics, **options)
     return curve, curve.bifurcations["LP"][0]
 
 
@@ -109,7 +109,7 @@ def test_a_rounded_law_has_no_layer():
 
 def test_a_pair_that_leaves_the_circle_behind_a_grazing():
     """Two masses and a stop: a Neimark-Sacker point a millionth behind the grazing, seen by shooting on both sides."""
-    curve = so.frequency_response(so.library.two_mass_unilateral(), (0.5, 0.6), 63)
+    curve = so.frequency_response(so.library.two_mass_unilateral(), (0.5, 0.6), harmonics=63)
     (torus,) = curve.bifurcations["NS"]
     (grazing,) = curve.grazings
     assert not torus.smooth

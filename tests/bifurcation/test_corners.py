@@ -14,7 +14,7 @@ def test_a_rotor_that_meets_its_stator_jumps_where_the_orbit_reaches_the_clearan
     """Circular orbits: r sqrt((1 - w^2)^2 + (c w)^2) = me w^2, a closed form for w at r = clearance = 0.2, c = 0.1."""
     squares = np.roots([1.0 - (me / 0.2) ** 2, 0.1**2 - 2.0, 1.0])
     touch = np.sqrt(squares.max())
-    curve = so.frequency_response(so.library.jeffcott_rotor(me=me), (8.0, touch - 0.1), 5)
+    curve = so.frequency_response(so.library.jeffcott_rotor(me=me), (8.0, touch - 0.1), harmonics=5)
     (fold,) = (b for b in curve.bifurcations["LP"] if abs(b.omega - touch) < 0.01)
     assert 0.0 < fold.uncertainty < 1e-7
     assert abs(fold.omega - touch) <= fold.uncertainty
@@ -32,7 +32,7 @@ def test_a_rotor_that_meets_its_stator_jumps_where_the_orbit_reaches_the_clearan
 def test_a_rotor_that_whirls_into_its_stator_and_out_of_it(omega):
     """The whole curve: contact begins everywhere at once, the curve turns there at the upper of the two frequencies."""
     touch = np.sqrt(np.sort(np.roots([1.0 - (0.05 / 0.2) ** 2, 0.1**2 - 2.0, 1.0])))
-    curve = so.frequency_response(so.library.jeffcott_rotor(), omega, 5)
+    curve = so.frequency_response(so.library.jeffcott_rotor(), omega, harmonics=5)
     assert curve.ended.startswith("reached the end")
     assert abs(curve.omega[-1] - omega[1]) < 1e-12
     low, high = sorted(curve.bifurcations["grazing"], key=lambda event: event.omega)
@@ -51,6 +51,6 @@ def test_a_rotor_that_whirls_into_its_stator_and_out_of_it(omega):
 def test_a_sharp_fold_of_a_smooth_law_is_no_corner():
     """As sharp as arctan steps of the stiffness make it: solved, not bracketed."""
     stop = so.ElasticStop(0, 200.0, 5.0, regularization=1e4)
-    curve = so.frequency_response(so.System(1.0, 0.1, 1.0, [stop], [so.HarmonicLoad(0, 1.0)]), (1.3, 1.0), 9)
+    curve = so.frequency_response(so.System(1.0, 0.1, 1.0, [stop], [so.HarmonicLoad(0, 1.0)]), (1.3, 1.0), harmonics=9)
     assert curve.bifurcations["LP"]
     assert all(fold.uncertainty == 0.0 for fold in curve.bifurcations["LP"])

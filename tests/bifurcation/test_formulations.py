@@ -32,7 +32,7 @@ PUBLISHED = {7: (2.2937369067, 3.9696952293), 15: (2.2937535514, 3.9697093215), 
 
 def above(system, harmonics, omega, away=5e-3, span=3.2):
     """The motion some way above omega, as a start."""
-    orbit = so.frequency_response(system, (omega + 2.0 * away, omega + away), harmonics).orbits[-1]
+    orbit = so.frequency_response(system, (omega + 2.0 * away, omega + away), harmonics=harmonics).orbits[-1]
     return Guess(orbit.state(), "omega", span)
 
 
@@ -176,8 +176,8 @@ def test_the_published_jacobian_against_differences(moving, name):
 
 def test_limit_points():
     """Eq. 15: both folds of the oscillator, by shooting 1.70709593 and 2.54594067 (to what 31 harmonics leave out)."""
-    curve = so.frequency_response(oscillator(), (3.0, 1.5), 31, formulation="extended")
-    default = so.frequency_response(oscillator(), (3.0, 1.5), 31)
+    curve = so.frequency_response(oscillator(), (3.0, 1.5), harmonics=31, formulation="extended")
+    default = so.frequency_response(oscillator(), (3.0, 1.5), harmonics=31)
     assert sorted(b.omega for b in curve.bifurcations["LP"]) == pytest.approx([1.70709593, 2.54594067], abs=2e-6)
     for a, b in zip(curve.bifurcations["LP"], default.bifurcations["LP"], strict=True):
         assert a.omega == pytest.approx(b.omega, abs=1e-11)
@@ -207,10 +207,10 @@ def test_period_doublings_of_two_masses_by_all_formulations():
         [so.ElasticStop(0, 9.0, 0.0), so.CubicSpring(0, 0.1)],
         [so.HarmonicLoad(0, 0.5)],
     )
-    default = so.frequency_response(system, (6.0, 1.6), 31)
+    default = so.frequency_response(system, (6.0, 1.6), harmonics=31)
     assert [b.kind for b in default.bifurcations] == ["PD", "NS", "NS", "PD", "PD", "PD", "PD"]
     for formulation, tolerance in (("extended", 1e-11), ("alcorta2019", 2e-6)):
-        curve = so.frequency_response(system, (6.0, 1.6), 31, formulation=formulation)
+        curve = so.frequency_response(system, (6.0, 1.6), harmonics=31, formulation=formulation)
         assert [b.kind for b in curve.bifurcations] == [b.kind for b in default.bifurcations]
         assert not curve.warnings
         for a, b in zip(curve.bifurcations, default.bifurcations, strict=True):
@@ -225,7 +225,7 @@ def test_period_doublings_of_two_masses_by_all_formulations():
 def test_a_motion_of_two_periods_doubles_again():
     """A parent with nu = 2: the 2T branch of the oscillator at p = 1.7 loses its stability to one of four periods."""
     system = so.library.reference_oscillator(p=1.7)
-    parent = so.frequency_response(system, (3.95, 3.9), 15).orbits[-1]
+    parent = so.frequency_response(system, (3.95, 3.9), harmonics=15).orbits[-1]
     basis = HarmonicBasis(30, 2)
     balance = HarmonicBalance(system, basis)
     x = parent.basis.resized(parent.coefficients, basis)
@@ -250,7 +250,9 @@ def test_what_is_no_period_doubling_is_refused():
     system = so.System(1.0, 0.02, 1.0, [so.CubicSpring(0, 0.1)], [so.HarmonicLoad(0, 0.01)])
     with pytest.raises(ConvergenceError):
         locate_doubling(above(system, 5, 2.0, away=0.01))
-    curve = so.frequency_response(system, (2.3, 1.7), 5, max_step=0.02, formulation=so.Alcorta2019("determinant"))
+    curve = so.frequency_response(
+        system, (2.3, 1.7), harmonics=5, max_step=0.02, formulation=so.Alcorta2019("determinant")
+    )
     assert not len(curve.bifurcations)
     assert not curve.warnings
 
@@ -264,7 +266,7 @@ def test_units_of_single_degrees_of_freedom_do_not_matter(formulation):
         mass, stiffness = (change.T @ matrix @ change for matrix in (np.eye(2), k))
         stop = [so.ElasticStop(dof, 9.0, 0.0), so.CubicSpring(dof, 0.1)]
         system = so.System(mass, 0.03 * stiffness, 2.0 * stiffness, stop, [so.HarmonicLoad(dof, 0.5)])
-        found.append(so.frequency_response(system, (5.2, 4.7), 9, formulation=formulation).bifurcations)
+        found.append(so.frequency_response(system, (5.2, 4.7), harmonics=9, formulation=formulation).bifurcations)
     one, other = found
     assert [b.kind for b in one] == [b.kind for b in other] == ["PD", "NS"]
     for a, b in zip(one, other, strict=True):

@@ -45,7 +45,7 @@ def described(grazings):
 @pytest.mark.parametrize(("Kc", "share"), [(30.0, 0.5), (30.0, 0.999), (1000.0, 0.999)])
 def test_first_touch_of_an_oscillator(Kc, share, harmonics):
     j = share / (2.0 * 0.05)
-    curve = so.frequency_response(oscillator(j, Kc), (1.3, 0.6), harmonics)
+    curve = so.frequency_response(oscillator(j, Kc), (1.3, 0.6), harmonics=harmonics)
     assert [g.omega for g in curve.grazings] == pytest.approx(first_touches(j), abs=1e-10)
     assert described(curve.grazings) == [(0, "begins to touch"), (0, "ceases to touch")]
     for g in curve.grazings:
@@ -166,7 +166,7 @@ def test_a_stop_with_a_rounded_corner_begins_where_its_law_is_sharp():
             loads=[so.HarmonicLoad(dof=0, amplitude=0.5)],
             parameters={"j": gap},
         )
-        curve = so.frequency_response(system, (1.6, 1.1), 15)
+        curve = so.frequency_response(system, (1.6, 1.1), harmonics=15)
         (g,) = curve.grazings
         assert described([g]) == [(0, "begins to touch")]
         u = g.orbit.displacement(np.linspace(0.0, g.orbit.period, 4001))[0]
@@ -288,8 +288,8 @@ def test_numbering_of_masses_and_elements_does_not_matter():
             loads=[so.HarmonicLoad(dof=int(index[0]), amplitude=0.5)],
         )
 
-    one = so.frequency_response(chain([0, 1, 2]), (2.2, 0.66), 13, observe=0)
-    other = so.frequency_response(chain([2, 0, 1]), (2.2, 0.66), 13, observe=1)
+    one = so.frequency_response(chain([0, 1, 2]), (2.2, 0.66), harmonics=13, observe=0)
+    other = so.frequency_response(chain([2, 0, 1]), (2.2, 0.66), harmonics=13, observe=1)
     assert len(one.grazings) >= 3
     assert [g.omega for g in other.grazings] == pytest.approx([g.omega for g in one.grazings], abs=1e-10)
     swapped = [(1 - element, change) for element, change in described(one.grazings)]

@@ -15,7 +15,7 @@ PARAMETERS = {"Kc": 4.7, "j": 0.8, "p": 0.55}
 def curve(element):
     loads = [so.HarmonicLoad(0, "p")]
     system = so.System(1.0, 0.06, 1.0, [so.CubicSpring(0, 0.16), element], loads, PARAMETERS)
-    return so.frequency_response(system, (2.4, 0.9), 15)
+    return so.frequency_response(system, (2.4, 0.9), harmonics=15)
 
 
 def test_a_stop_as_text_and_a_stop_have_the_same_events():
@@ -38,7 +38,7 @@ def test_a_coupled_contact_touches_where_its_own_displacement_reaches_the_corner
     )
     (element,) = system.elements
     np.testing.assert_array_equal(element.direction(2), [1.0, -1.0])
-    grazings = so.frequency_response(system, (0.6, 0.7), 25).bifurcations["grazing"]
+    grazings = so.frequency_response(system, (0.6, 0.7), harmonics=25).bifurcations["grazing"]
     assert [g.contact.change for g in grazings] == ["begins to touch"]
     (grazing,) = grazings
     x, v = grazing.orbit.displacement(grazing.contact.time), grazing.orbit.velocity(grazing.contact.time)
@@ -78,7 +78,7 @@ def test_a_bifurcation_that_more_harmonics_lead_away_from_keeps_its_place(monkey
 
 def test_a_fold_behind_the_grazing_of_a_text_is_laid_at_its_door():
     text, stop = (
-        so.frequency_response(so.System(1.0, 0.1, 1.0, [element], [so.HarmonicLoad(0, 1.0)]), (1.3, 1.0), 9)
+        so.frequency_response(so.System(1.0, 0.1, 1.0, [element], [so.HarmonicLoad(0, 1.0)]), (1.3, 1.0), harmonics=9)
         for element in (so.Expression(0, "200*max(x - 5, 0)"), so.ElasticStop(0, 200.0, 5.0))
     )
     (mine,), (theirs,) = text.bifurcations["LP"], stop.bifurcations["LP"]

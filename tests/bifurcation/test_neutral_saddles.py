@@ -50,7 +50,7 @@ def test_oscillator_without_damping(damping):
 
 def test_fold_without_damping_against_one_harmonic():
     """`(1 - omega^2) a + 3/4 a^3 = F` turns at `omega^2 = 1 + 9/4 a^2`, `3/2 a^3 = -F`."""
-    curve = so.frequency_response(so.library.duffing(c=0.0, F=0.3), (3.0, 0.8), 1)
+    curve = so.frequency_response(so.library.duffing(c=0.0, F=0.3), (3.0, 0.8), harmonics=1)
     a = (2.0 * 0.3 / 3.0) ** (1.0 / 3.0)
     (fold,) = curve.bifurcations
     assert fold.omega == pytest.approx(np.sqrt(1.0 + 2.25 * a**2), abs=1e-9)

@@ -255,7 +255,7 @@ def test_strong_resonances_are_stated(omega, words):
 
 def test_decay_towards_a_neimark_sacker_point():
     """At the point itself `1 / |A|^2` grows by -2 c3 per time: A from a long integration, by the left eigenvector."""
-    curve = so.frequency_response(so.library.nltva(0.11), (1.1, 1.12), 9)
+    curve = so.frequency_response(so.library.nltva(0.11), (1.1, 1.12), harmonics=9)
     (b,) = curve.bifurcations["NS"]
     period, start, form = b.orbit.period, b.orbit.start(), b.normal_form
 

@@ -69,7 +69,7 @@ def test_chain_of_ten_masses(chain_data, same_events):
 @pytest.mark.slow
 def test_chain_of_ten_masses_with_many_harmonics(chain_data, same_events):
     system, last = chain(chain_data), chain_data["masses"] - 1
-    curve = so.frequency_response(system, tuple(chain_data["omega"]), 63, observe=last)
+    curve = so.frequency_response(system, tuple(chain_data["omega"]), harmonics=63, observe=last)
     expected = [[e["kind"], e["omega"], e["amplitude_last_mass"]] for e in chain_data["bifurcations"]]
     same_events(curve.bifurcations, expected, omega=3e-9, amplitude=2e-6)
 

@@ -71,7 +71,7 @@ def test_no_false_folds_at_any_step(oscillator_curve, max_step, omega):
 @pytest.mark.parametrize("harmonics", ["adaptive", 31])
 def test_multipliers_by_shooting(reference, harmonics):
     system = so.library.reference_oscillator(regularization=3000.0)
-    curve = so.frequency_response(system, (3.0, 2.95), harmonics)
+    curve = so.frequency_response(system, (3.0, 2.95), harmonics=harmonics)
     expected = reference["reference_oscillator"]["s3000_p0.55_j0_multipliers_at_omega_3"]
     assert np.sort(curve.multipliers[0].real) == pytest.approx(expected, abs=1e-4)
     assert np.abs(curve.multipliers[0].imag).max() < 1e-12

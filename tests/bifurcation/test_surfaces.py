@@ -24,7 +24,7 @@ def test_a_stop_between_two_masses_written_as_a_text():
     stop = so.System(*matrices, [so.ElasticStop((0, 1), 4.0, "gap")], load, parameters)
     texts = [so.Expression(dof, f"{sign}4*max(x-y-gap, 0)", {"x": 0, "y": 1}) for dof, sign in ((0, ""), (1, "-"))]
     written = so.System(*matrices, texts, load, parameters)
-    expected, found = (so.frequency_response(system, (2.2, 1.25), 25) for system in (stop, written))
+    expected, found = (so.frequency_response(system, (2.2, 1.25), harmonics=25) for system in (stop, written))
     assert len(expected.bifurcations) > 1
     same(events(found), events(expected))
     assert pairing(found.multipliers[-1], expected.multipliers[-1]) < 1e-7
@@ -41,7 +41,7 @@ def test_a_gap_that_moves():
     phase = f"atan({2 * zeta * a}*omega/(F + {a}*(omega**2 - 1)))"
     stop = so.ElasticStop(0, 3.0, 0.5)
     relative = so.System(1.0, 2 * zeta, 1.0, [stop], [so.HarmonicLoad(0, amplitude, phase=phase)], parameters)
-    found, expected = (so.frequency_response(system, (2.0, 0.9), 25) for system in (moving, relative))
+    found, expected = (so.frequency_response(system, (2.0, 0.9), harmonics=25) for system in (moving, relative))
     assert len(expected.bifurcations) > 1
     same(events(found), events(expected))
 
@@ -73,7 +73,7 @@ def test_a_heavy_rotor_in_a_ring():
 
 @pytest.mark.slow
 def test_unequal_bearings():
-    curve = so.frequency_response(rotor(0.0, "1.1*k"), (0.84, 0.9), 21)
+    curve = so.frequency_response(rotor(0.0, "1.1*k"), (0.84, 0.9), harmonics=21)
     assert [str(event.kind) for event in curve.bifurcations] == ["BP", "BP", "NS"]
     check = so.verify(curve)
     assert all(event.agrees for event in check.bifurcations), check
@@ -91,7 +91,7 @@ def test_heights_over_a_surface_against_differences(name):
         [so.HarmonicLoad(0, 0.5)],
         {"b": 0.3, "a": 0.2},
     )
-    orbit = so.frequency_response(system, (1.0, 1.1), 7).orbits[0]
+    orbit = so.frequency_response(system, (1.0, 1.1), harmonics=7).orbits[0]
     state, change = orbit.state(), np.random.default_rng(0).normal(size=orbit.state().x.shape)
     tau = float(gap_extrema(state)[0].tau[0])
 

@@ -68,7 +68,7 @@ OTHERS = {"nc", "png", "gif", "bordered", "gaps", "measures", "extremum"}
 def results():
     """Results by the names that pages give them."""
     system = so.library.duffing(c=0.05, F=0.3)
-    diagram = so.bifurcation_diagram(system, (2.5, 0.8), 0, harmonics=3)
+    diagram = so.bifurcation_diagram(system, (2.5, 0.8), depth=0, harmonics=3)
     branch = next(iter(diagram)).branch
     fold = branch.bifurcations["LP"][0]
     tracked = so.track(fold, "F", (0.29, 0.31))

@@ -156,7 +156,7 @@ def test_librations_about_another_turn_are_those_about_none():
         )
         (found,) = sections.attractors
         assert (found.period, found.count, found.turns) == (1, 3, (0,))
-        orbit = so.periodic_orbit(system, 1.0, found.state)
+        orbit = so.periodic_orbit(system, 1.0, state=found.state)
         assert found.amplitude == pytest.approx(orbit.amplitude(0), rel=10.0 * off)
         assert found.points[0] == pytest.approx(orbit.start(), abs=off)
 
@@ -204,7 +204,7 @@ def test_harmonic_balance_says_that_it_has_no_rotations():
     state = so.poincare_sections(pendulum(1.35), omega=OMEGA).attractor(0).state
     for angles in (("x",), ()):
         with pytest.raises(so.ConvergenceError, match=r"x grows by -6\.28319 in its period\. Harmonic"):
-            so.periodic_orbit(pendulum(1.35, angles), OMEGA, state)
+            so.periodic_orbit(pendulum(1.35, angles), OMEGA, state=state)
     with pytest.raises(so.ConvergenceError, match="follow what turns in time"):
         so.frequency_response(pendulum(1.35), (OMEGA, 0.9), start=state)
 
@@ -247,7 +247,7 @@ def test_basins_of_rotations():
 @pytest.mark.slow
 def test_a_regime_map_is_told_of_rotations():
     """At loads at which the pendulum turns over the map has its librations only: what turns is listed as such."""
-    found = so.regime_map(pendulum(1.2), (0.6, 0.7), "FD", (1.3, 1.4), 9, depth=0, values=1)
+    found = so.regime_map(pendulum(1.2), (0.6, 0.7), "FD", (1.3, 1.4), harmonics=9, depth=0, values=1)
     checked = found.check(points=3, states=3, transient=60)
     assert isinstance(checked, RegimeCheck)
     assert checked.counts.get(ROTATES)

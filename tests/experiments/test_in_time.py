@@ -58,7 +58,7 @@ def test_sizes_do_not_depend_on_units():
 
 # --------------------------------------------------------------------------------------------------------- integrate
 def test_a_trajectory_from_a_periodic_motion_repeats(oscillator):
-    orbit = so.periodic_orbit(oscillator, 2.25, [0.1, 0.0], harmonics=40)
+    orbit = so.periodic_orbit(oscillator, 2.25, state=[0.1, 0.0], harmonics=40)
     motion = so.integrate(oscillator, orbit, omega=2.25, periods=3, steps_per_period=50)
     assert motion.time.shape == (151,)
     assert motion.displacement.shape == motion.velocity.shape == (151, 1)
@@ -131,7 +131,7 @@ def test_a_diagram_doubles_where_the_branch_does():
     system = so.library.reference_oscillator()
     values = np.array([3.90, 3.96, 3.98, 4.02])
     # from rest another attractor is met, of period 3T
-    orbit = so.periodic_orbit(system, 4.02, [-0.05, 0.0], harmonics=30)
+    orbit = so.periodic_orbit(system, 4.02, state=[-0.05, 0.0], harmonics=30)
     diagram = so.brute_force_diagram(system, values, start=("down", "rest"), state=orbit, transient=600, periods=12)
     assert diagram.starts == ("down", "rest")
     assert diagram.period[0].tolist() == [2, 2, 1, 1]

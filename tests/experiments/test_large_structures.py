@@ -99,7 +99,9 @@ def test_a_transient_is_that_of_all_degrees_of_freedom(stop):
     short = so.integrate(stop, omega=omega, periods=periods)
     exact = witness(stop, np.zeros(2 * N), short.time, omega)
     assert len(exact.contacts) > 4
-    fine = so.integrate(stop, omega=omega, periods=periods, linear=so.condense(stop, omega, 60, [TIP, 20]))
+    fine = so.integrate(
+        stop, omega=omega, periods=periods, linear=so.condense(stop, omega, harmonics=60, observe=[TIP, 20])
+    )
     errors = [np.abs(one.displacement - exact.x).max() / np.abs(exact.x).max() for one in (short, fine)]
     assert errors[0] < 1e-3
     assert errors[1] < 0.1 * errors[0]

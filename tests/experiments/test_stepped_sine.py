@@ -36,7 +36,7 @@ def test_sweeps_lie_on_stable_branches_and_jump_at_folds(duffing, both, duffing_
     lower, upper = sorted(b.omega for b in duffing_curve.bifurcations["LP"])
     for s, direction in enumerate(both.directions):
         for v, w in enumerate(both.omega):
-            orbit = so.periodic_orbit(duffing, w, both.ends[s, v])
+            orbit = so.periodic_orbit(duffing, w, state=both.ends[s, v])
             assert abs(both.response[s, v, 0]) == pytest.approx(abs(orbit.harmonic(1)), rel=1e-5)
             third = both.harmonic(3, 0, direction)[v]
             assert third == pytest.approx(orbit.harmonic(3), abs=1e-5 * abs(orbit.harmonic(1)))
@@ -185,5 +185,7 @@ def test_a_tap_leads_onto_the_published_isola():
         for s in range(2):
             assert (test.period[s] == 0).sum() <= 1  # behind a jump it may not be settled
             for v in np.flatnonzero(test.period[s]):
-                orbit = so.periodic_orbit(system, test.omega[v], test.ends[s, v], int(test.period[s, v]))
+                orbit = so.periodic_orbit(
+                    system, test.omega[v], state=test.ends[s, v], subharmonic=int(test.period[s, v])
+                )
                 assert abs(test.response[s, v, 0]) == pytest.approx(abs(orbit.harmonic(1)), rel=1e-3)

@@ -55,7 +55,7 @@ def drawn(harmonics, each, seed, rounded=None):
     rng = np.random.default_rng(seed)
     found = []
     for name, system, omega in reference_curves():
-        curve = so.frequency_response(system, omega, harmonics)
+        curve = so.frequency_response(system, omega, harmonics=harmonics)
         for wanted in (curve.stable, ~curve.stable):
             places = np.flatnonzero(wanted)
             count = each if rounded is None or not name.endswith("s=3000.0") else rounded
@@ -133,7 +133,7 @@ def random_motions(seed, count) -> Iterator[Draw]:
         omega = lowest * rng.uniform(0.7, 3.0)
         harmonics = int(rng.choice([7, 15, 31]))
         try:
-            curve = so.frequency_response(system, (1.3 * omega, omega), harmonics)
+            curve = so.frequency_response(system, (1.3 * omega, omega), harmonics=harmonics)
         except ConvergenceError:
             continue
         for places in (np.flatnonzero(curve.stable), np.flatnonzero(~curve.stable)):

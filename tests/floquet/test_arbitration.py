@@ -21,7 +21,7 @@ from suboctave.timedomain import shoot
 
 @pytest.fixture(scope="module")
 def doubling():
-    curve = so.frequency_response(so.library.reference_oscillator(), (4.5, 3.8), 31)
+    curve = so.frequency_response(so.library.reference_oscillator(), (4.5, 3.8), harmonics=31)
     return curve.bifurcations["PD"][0]
 
 
@@ -37,7 +37,7 @@ def test_methods_by_object_and_by_name(doubling, at):
         by_name, by_object = so.stability(orbit, method=name), so.stability(orbit, method=method)
         np.testing.assert_array_equal(by_name.multipliers, by_object.multipliers)
         assert method_of(name) == method
-    assert so.stability(orbit, "hill").method == "Hill"
+    assert so.stability(orbit, method="hill").method == "Hill"
     assert so.Hill() == so.Hill(selection="strip")
     assert hash(so.Hill()) == hash(so.Hill(selection="strip"))
 
@@ -52,7 +52,7 @@ def test_methods_by_object_and_by_name(doubling, at):
 )
 def test_wrong_methods_are_refused(doubling, method, message):
     with pytest.raises(InputError, match=message):
-        so.stability(doubling.orbit, method)
+        so.stability(doubling.orbit, method=method)
 
 
 def test_wrong_options_are_refused():
@@ -149,7 +149,7 @@ def test_roots_of_a_few_unknowns_settle_the_verdict_of_many_modes(monkeypatch):
     doubling = so.frequency_response(plate, (2.31, 2.28), harmonics=15).bifurcations["PD"][0]
     for omega, stable in ((2.29946, True), (2.2994, False)):
         orbit = so.continue_branch(doubling.orbit, "omega", (omega, doubling.omega)).orbits[0]
-        known = so.stability(orbit, "monodromy")
+        known = so.stability(orbit, method="monodromy")
         errors = known.errors.copy()
         errors[0] = 0.01
         verdict = so.Arbitration().settled(orbit.state(), replace(known, errors=errors))
@@ -185,7 +185,7 @@ class Says(StabilityMethod):
 def test_a_contradiction_is_said_in_words(doubling, coarse):
     found = coarse(doubling.orbit.state())
     far = replace(found, multipliers=found.multipliers * 1.5, errors=found.errors, method="a liar")
-    joint = so.stability(doubling, so.Arbitration(witnesses=(Says(far),)))
+    joint = so.stability(doubling, method=so.Arbitration(witnesses=(Says(far),)))
     assert "monodromy and a liar contradict each other" in joint.note
     assert not joint.decided
     # the doubt covers both
@@ -196,11 +196,11 @@ def test_a_silent_witness_is_passed_over(doubling, coarse):
     found = coarse(doubling.orbit.state())
     silent = Says(FloquetResult.inapplicable(2, "mute", "Nothing to say here"))
     sure = Says(result(-1.0 + 1e-7, found.multipliers[1], error=1e-9, method="sure"))
-    joint = so.stability(doubling, so.Arbitration(witnesses=(silent, sure)))
+    joint = so.stability(doubling, method=so.Arbitration(witnesses=(silent, sure)))
     assert joint.decided
     assert joint.stable
     assert "sure settles it" in joint.note
-    alone = so.stability(doubling, so.Arbitration(witnesses=(silent,)))
+    alone = so.stability(doubling, method=so.Arbitration(witnesses=(silent,)))
     assert not alone.decided
     assert "Nothing to say here" in alone.note
 

@@ -123,12 +123,12 @@ def test_kernels_agree_on_uncoupled_oscillators(regularization):
     both = so.System(
         np.eye(2), np.diag([0.1, 0.2]), np.diag([1.0, 2.0]), [e for pair in elements for e in pair], list(loads)
     )
-    together = so.frequency_response(both, (2.2, 1.9), 11).orbits[-1]
+    together = so.frequency_response(both, (2.2, 1.9), harmonics=11).orbits[-1]
     expected = []
     for i in range(2):
         parts, load = oscillator(i, 1)
         alone = so.System(1.0, 0.1 * (i + 1), 1.0 + i, parts, [load])
-        orbit = so.frequency_response(alone, (2.2, 1.9), 11).orbits[-1]
+        orbit = so.frequency_response(alone, (2.2, 1.9), harmonics=11).orbits[-1]
         np.testing.assert_allclose(orbit.coefficients[:, 0], together.coefficients[:, i], atol=1e-9)
         expected += list(so.stability(orbit).multipliers)
     assert paired(np.array(expected), so.stability(together).multipliers).max() < 1e-7

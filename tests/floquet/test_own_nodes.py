@@ -45,7 +45,7 @@ SYSTEMS = {
 def motions(request):
     make, bounds, wanted = SYSTEMS[request.param]
     system = make()
-    curve = so.frequency_response(system, bounds, 15)
+    curve = so.frequency_response(system, bounds, harmonics=15)
     found = []
     for omega in wanted:
         orbit = curve.orbits[int(np.argmin(np.abs(curve.omega - omega)))]
@@ -56,7 +56,7 @@ def motions(request):
 @pytest.mark.parametrize("method", ["monodromy", "hill"])
 def test_multipliers_agree_with_shooting_as_they_state(motions, method):
     for orbit, exact in motions:
-        found = so.stability(orbit, method)
+        found = so.stability(orbit, method=method)
         assert found.applicable
         for mu, error in zip(found.multipliers, found.errors, strict=True):
             assert np.abs(exact.multipliers - mu).min() <= 2.0 * error + 1e-7
@@ -71,5 +71,5 @@ def test_the_motion_itself_is_that_of_shooting(motions):
 
 def test_products_follow_liouville(motions):
     for orbit, exact in motions:
-        product = np.prod(so.stability(orbit, "monodromy").multipliers).real
+        product = np.prod(so.stability(orbit, method="monodromy").multipliers).real
         assert product == pytest.approx(np.prod(exact.multipliers).real, rel=2e-3)

@@ -66,8 +66,8 @@ def test_hill_is_not_applicable_below_the_natural_frequencies(distances):
         np.eye(2), 0.02 * np.eye(2), np.diag([1.0, 400.0]), [so.CubicSpring(0, 0.1)], [so.HarmonicLoad(0, 0.5)]
     )
     for harmonics in (5, 25):
-        orbit = so.frequency_response(system, (1.4, 1.5), harmonics).orbits[-1]
-        result = so.stability(orbit, "hill")
+        orbit = so.frequency_response(system, (1.4, 1.5), harmonics=harmonics).orbits[-1]
+        result = so.stability(orbit, method="hill")
         assert not result.applicable
         assert np.isnan(result.multipliers).all()
         assert np.isinf(result.errors).all()
@@ -75,8 +75,8 @@ def test_hill_is_not_applicable_below_the_natural_frequencies(distances):
         assert not result.decided
         assert "27 would do" in result.note
         assert "not applicable" in repr(result)
-    orbit = so.frequency_response(system, (1.4, 1.5), 27).orbits[-1]
-    result = so.stability(orbit, "hill")
+    orbit = so.frequency_response(system, (1.4, 1.5), harmonics=27).orbits[-1]
+    result = so.stability(orbit, method="hill")
     assert result.applicable
     assert distances(result.multipliers, floquet_multipliers(orbit.state()).multipliers).max() < 1e-9
 
@@ -85,8 +85,8 @@ def test_a_strip_that_holds_another_number_is_no_result(monkeypatch):
     """A spurious eigenvalue inside the strip is found out."""
     honest = hill.exponents
     monkeypatch.setattr(hill, "exponents", lambda system, h: np.append(honest(system, h), -0.1 + 0.01j))
-    orbit = so.frequency_response(so.library.duffing(), (2.0, 1.9), 9).orbits[-1]
-    result = so.stability(orbit, "hill")
+    orbit = so.frequency_response(so.library.duffing(), (2.0, 1.9), harmonics=9).orbits[-1]
+    result = so.stability(orbit, method="hill")
     assert not result.applicable
     assert "3 of Hill's eigenvalues lie in a strip that must hold 2" in result.note
 
@@ -117,6 +117,6 @@ def test_a_limit_point_itself_stays_undecided(method):
     curve = so.frequency_response(so.library.duffing(), (0.3, 1.0))
     assert len(curve.bifurcations["LP"]) == 2
     for point in curve.bifurcations["LP"]:
-        result = so.stability(point, method)
+        result = so.stability(point, method=method)
         assert np.abs(result.multipliers - 1.0).min() <= result.errors[np.abs(result.multipliers - 1.0).argmin()]
         assert not result.decided

@@ -16,7 +16,7 @@ OTHERS = ["imaginary", "symmetry"]
 @pytest.fixture(scope="module")
 def beside_period_doublings(at):
     """Motions on both sides of two period doublings, with their multipliers by shooting: real and negative."""
-    curve = so.frequency_response(so.library.reference_oscillator(), (4.5, 2.2), 15)
+    curve = so.frequency_response(so.library.reference_oscillator(), (4.5, 2.2), harmonics=15)
     assert len(curve.bifurcations["PD"]) == 2
     chosen = []
     for doubling in curve.bifurcations["PD"]:
@@ -31,7 +31,7 @@ def beside_period_doublings(at):
 
 def test_strip_beside_period_doublings(beside_period_doublings, distances):
     for orbit, exact in beside_period_doublings:
-        result = so.stability(orbit, so.Hill())
+        result = so.stability(orbit, method=so.Hill())
         assert np.all(distances(result.multipliers, exact.multipliers) <= result.errors + 1e-9)
         assert result.stable == exact.stable
 
@@ -43,7 +43,7 @@ def test_other_selections_fail_beside_every_period_doubling(beside_period_doubli
     The result says so, and states no digit.
     """
     for orbit, exact in beside_period_doublings:
-        result = so.stability(orbit, so.Hill(selection))
+        result = so.stability(orbit, method=so.Hill(selection))
         assert distances(result.multipliers, exact.multipliers).max() > 0.01
         assert abs(abs(result.multipliers[0]) - abs(result.multipliers[1])) < 1e-3
         assert "takes an exponent twice" in result.note
@@ -53,12 +53,12 @@ def test_other_selections_fail_beside_every_period_doubling(beside_period_doubli
 
 def test_smallest_imaginary_parts_call_unstable_motions_stable():
     """Not a matter of digits: the verdict itself is wrong on some motions, rounding decides on which."""
-    curve = so.frequency_response(so.library.reference_oscillator(), (4.5, 2.2), 15, max_step=0.01)
+    curve = so.frequency_response(so.library.reference_oscillator(), (4.5, 2.2), harmonics=15, max_step=0.01)
     first, last = sorted(b.omega for b in curve.bifurcations["PD"])
     between = [point for point in curve.points if first < point.orbit.omega < last]
     assert len(between) > 50
     assert not any(point.floquet.stable for point in between)
-    wrong = [point for point in between if so.stability(point, so.Hill("imaginary")).stable]
+    wrong = [point for point in between if so.stability(point, method=so.Hill("imaginary")).stable]
     assert wrong
     # those found unstable by the strip are, by shooting
     orbit = wrong[0].orbit
@@ -69,12 +69,12 @@ def test_smallest_imaginary_parts_call_unstable_motions_stable():
 def test_other_selections_agree_elsewhere(selection):
     """Complex pairs and positive real multipliers: all rules take the same."""
     seen = set()
-    for point in so.frequency_response(so.library.duffing(), (0.3, 6.0), 15).points[::8]:
+    for point in so.frequency_response(so.library.duffing(), (0.3, 6.0), harmonics=15).points[::8]:
         mu = point.floquet.multipliers
         if not mu.imag.any() and mu.real.max() < 0.0:
             continue
         seen.add("complex" if mu.imag.any() else "real")
-        strip, other = so.stability(point, so.Hill()), so.stability(point, so.Hill(selection))
+        strip, other = so.stability(point, method=so.Hill()), so.stability(point, method=so.Hill(selection))
         np.testing.assert_allclose(np.sort_complex(other.multipliers), np.sort_complex(strip.multipliers), atol=1e-9)
         assert other.note == ""
     assert seen == {"complex", "real"}

@@ -33,7 +33,7 @@ def test_fifty_motions_by_shooting(fifty, distances, method, each):
     """Within its own error estimate of shooting everywhere, the estimate below 1e-3, every verdict the same."""
     assert [draw.stable for draw in fifty[::each]] == [i < 25 for i in range(0, 50, each)]
     for draw in fifty[::each]:
-        result = so.stability(draw.orbit, method)
+        result = so.stability(draw.orbit, method=method)
         assert result.applicable, (draw.name, result)
         assert np.all(distances(result.multipliers, draw.exact) <= result.errors + SHOOTING), (draw.name, result)
         assert result.errors.max() <= 1e-3, (draw.name, result)
@@ -44,7 +44,7 @@ def test_fifty_motions_by_shooting(fifty, distances, method, each):
 def test_truncations_cancel_in_hills_method(fifty, distances):
     """With contacts the truncated motion alone, or the truncated perturbation alone, move multipliers by up to 1e-4."""
     contacts = [d for d in fifty if d.name.startswith("p=") and "j=0.0" in d.name]
-    errors = [distances(so.stability(d.orbit, "hill").multipliers, d.exact).max() for d in contacts]
+    errors = [distances(so.stability(d.orbit, method="hill").multipliers, d.exact).max() for d in contacts]
     truncated = []
     for draw in contacts:
         motion = draw.orbit.state()
@@ -60,7 +60,7 @@ def test_truncations_cancel_in_hills_method(fifty, distances):
 def test_hill_checks_itself(fifty):
     """Exactly 2 n eigenvalues in the strip, reported on the result."""
     for draw in fifty[::7]:
-        checks, size = so.stability(draw.orbit, "hill").checks, 2 * draw.orbit.system.n
+        checks, size = so.stability(draw.orbit, method="hill").checks, 2 * draw.orbit.system.n
         assert checks["inside the strip"] == checks["expected"] == size
         assert checks["gap"] >= 0.99 / size
         assert checks["Liouville"] < 1e-6
@@ -74,7 +74,7 @@ def test_coverage_on_the_reference_curves(draw, distances, method, harmonics):
     covered, whole, motions = [], [], [item for _, item in draw(harmonics, 12, seed=harmonics)]
     assert sum(not item.stable for item in motions) == len(motions) // 2
     for item in motions:
-        result = so.stability(item.orbit, method)
+        result = so.stability(item.orbit, method=method)
         inside = distances(result.multipliers, item.exact) <= result.errors + SHOOTING
         covered += list(inside)
         whole.append(inside.all())
@@ -91,7 +91,7 @@ def test_coverage_on_random_systems(random_motions, distances, method):
     """The same for systems of one to three DOFs and 7 to 31 harmonics; no decided verdict is wrong."""
     covered, silent, wrong = [], 0, []
     for item in random_motions(11, 150):
-        result = so.stability(item.orbit, method)
+        result = so.stability(item.orbit, method=method)
         if not result.applicable:
             silent += 1
             continue
@@ -108,7 +108,7 @@ def test_a_few_random_systems(random_motions, distances):
     covered = {method: [] for method in METHODS}
     for item in random_motions(3, 5):
         for method in METHODS:
-            result = so.stability(item.orbit, method)
+            result = so.stability(item.orbit, method=method)
             if result.applicable:
                 covered[method] += list(distances(result.multipliers, item.exact) <= result.errors + SHOOTING)
                 assert result.stable == item.stable or not result.decided, item.name
@@ -128,7 +128,7 @@ def test_gyroscopic_and_circulatory_forces(distances, method):
     )
     orbit = so.frequency_response(system, (2.6, 1.9), harmonics=25).orbits[-1]
     exact = shoot(system, orbit.start(), orbit.omega).multipliers
-    result = so.stability(orbit, method)
+    result = so.stability(orbit, method=method)
     assert np.all(distances(result.multipliers, exact) <= result.errors + SHOOTING)
     assert result.error < 1e-3
 
@@ -139,7 +139,7 @@ def test_forces_of_velocity(drag, distances, method):
     system = so.System(1.0, 0.01, 1.0, [drag(0, [0.02, 0.3, 0.1])], [so.HarmonicLoad(0, 1.2)])
     orbit = so.frequency_response(system, (2.0, 1.1), harmonics=13).orbits[-1]
     exact = shoot(system, orbit.start(), orbit.omega).multipliers
-    result = so.stability(orbit, method)
+    result = so.stability(orbit, method=method)
     assert np.all(distances(result.multipliers, exact) <= result.errors + SHOOTING)
     assert result.error < 1e-4
 
@@ -166,7 +166,7 @@ def doubled(request):
 @each_method
 def test_motions_of_two_periods(doubled, distances, method):
     orbit, solution = doubled
-    result = so.stability(orbit, method)
+    result = so.stability(orbit, method=method)
     assert np.all(distances(result.multipliers, solution.multipliers) <= result.errors + SHOOTING)
     assert result.error < 1e-3
     assert result.stable
@@ -210,12 +210,12 @@ def test_liouville(fifty, drag, method):
     for draw in fifty[::5]:
         mass, damping, _ = draw.orbit.system.matrices()
         expected = np.exp(-np.trace(np.linalg.solve(mass, damping)) * draw.orbit.period)
-        check(so.stability(draw.orbit, method), expected)
+        check(so.stability(draw.orbit, method=method), expected)
     system = so.System(1.0, 0.05, 1.0, [drag(0, [-0.1, 0.3, 0.0])], [so.HarmonicLoad(0, 2.0)])
     orbit = so.frequency_response(system, (2.5, 2.0), harmonics=15).orbits[-1]
     x = orbit.coefficients[:, 0]
     square = x[0] ** 2 + 0.5 * (x[1:] ** 2).sum()
-    check(so.stability(orbit, method), np.exp(-orbit.period * (0.05 - 0.1 + 0.3 * square)))
+    check(so.stability(orbit, method=method), np.exp(-orbit.period * (0.05 - 0.1 + 0.3 * square)))
 
 
 def check(result, expected):
@@ -230,7 +230,7 @@ def test_multipliers_are_closed_under_conjugation(fifty, method):
     """Of a real equation; a negative real one must not carry an imaginary part."""
     negative = 0
     for draw in fifty[::4]:
-        mu = so.stability(draw.orbit, method).multipliers
+        mu = so.stability(draw.orbit, method=method).multipliers
         assert np.abs(mu[:, None] - mu.conj()[None, :]).min(axis=1).max() < 1e-12 * np.abs(mu).max()
         real = (draw.exact.real < 0.0) & (np.abs(draw.exact.imag) < 1e-9)
         if real.all():
@@ -261,7 +261,7 @@ def test_units_and_order_of_dofs_do_not_matter(method):
             [so.HarmonicLoad(at[0], 0.3 * mass * length / time**2)],
         )
         orbit = so.frequency_response(system, (2.4 / time, 1.9 / time), harmonics=15).orbits[-1]
-        return np.sort_complex(so.stability(orbit, method).multipliers)
+        return np.sort_complex(so.stability(orbit, method=method).multipliers)
 
     expected = multipliers(1.0, 1.0, 1.0, [0, 1])
     np.testing.assert_allclose(multipliers(1e-3, 1e3, 1e3, [1, 0]), expected, rtol=1e-7, atol=1e-9)
@@ -274,10 +274,10 @@ def test_condensed_linear_part(distances, method):
     k = 2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
     elements = [so.ElasticStop(0, 3.0, 0.5), so.CubicSpring(0, 0.05)]
     system = so.System(np.eye(n), 0.06 * k, k, elements, [so.HarmonicLoad(0, 0.4)])
-    orbit = so.frequency_response(system, (0.6, 0.7), 9).orbits[-1]
-    whole = so.frequency_response(system, (0.6, 0.7), 9).orbits[-1]
+    orbit = so.frequency_response(system, (0.6, 0.7), harmonics=9).orbits[-1]
+    whole = so.frequency_response(system, (0.6, 0.7), harmonics=9).orbits[-1]
     exact = shoot(system, whole.start(), whole.omega).multipliers
-    result = so.stability(orbit, method)
+    result = so.stability(orbit, method=method)
     assert result.multipliers.shape == (2 * n,)
     assert np.all(distances(result.multipliers, exact) <= result.errors + SHOOTING)
     assert result.error < 1e-2

@@ -161,8 +161,8 @@ def test_period_doublings_by_other_formulations(formulation):
     elements = [so.ElasticStop(0, 9.0, 0.0), so.CubicSpring(0, 0.1)]
     system = so.System(np.eye(3), 0.03 * k, 2.0 * k, elements, [so.HarmonicLoad(0, 0.5)])
     full = whole(system, (2.8, 2.2), 9, formulation=formulation).bifurcations["PD"]
-    small = so.frequency_response(system, (2.8, 2.2), 9, formulation=formulation).bifurcations["PD"]
-    default = so.frequency_response(system, (2.8, 2.2), 9).bifurcations["PD"]
+    small = so.frequency_response(system, (2.8, 2.2), harmonics=9, formulation=formulation).bifurcations["PD"]
+    default = so.frequency_response(system, (2.8, 2.2), harmonics=9).bifurcations["PD"]
     assert len(default) == 2
     assert [b.omega for b in small] == pytest.approx([b.omega for b in full], abs=1e-9)
     exact = formulation == "extended"

@@ -50,7 +50,7 @@ def test_describing_function_of_quadratic_damping():
 def test_a_linear_oscillator_with_quadratic_damping_at_one_harmonic():
     """Amplitude from `|k - omega^2 + i omega (d + 8/(3 pi) c omega a)| a = p`."""
     system = so.System(1.0, 0.01, 1.0, elements=[so.QuadraticDamper(0, 0.4)], loads=[so.HarmonicLoad(0, 0.3)])
-    curve = so.frequency_response(system, (0.5, 1.8), 1)
+    curve = so.frequency_response(system, (0.5, 1.8), harmonics=1)
     a, w = np.abs([o.harmonic(1) for o in curve.orbits]), curve.omega
     size = np.hypot(1.0 - w**2, w * (0.01 + 8.0 / (3.0 * np.pi) * 0.4 * w * a)) * a
     np.testing.assert_allclose(size, 0.3, rtol=1e-8)

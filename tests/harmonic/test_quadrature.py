@@ -269,7 +269,7 @@ def test_events_do_not_depend_on_what_a_law_tells():
         stops = [stop(0, 4.7, 0.0, side="right", regularization=60.0), stop(0, 4.7, -1.0, regularization=60.0)]
         system = System(1.0, 0.06, 1.0, elements=[CubicSpring(0, 0.16), *stops], loads=[HarmonicLoad(0, 0.55)])
         rule = AdaptiveHarmonics(tolerance=3e-3, event_tolerance=1e-8)
-        (event,) = so.frequency_response(system, (0.95, 1.1), rule).bifurcations
+        (event,) = so.frequency_response(system, (0.95, 1.1), harmonics=rule).bifurcations
         found.append(event)
     assert found[1].omega == pytest.approx(found[0].omega, rel=1e-10)
     assert found[1].orbit.basis == found[0].orbit.basis

@@ -37,7 +37,7 @@ def test_ends_move_as_ends_that_are_located_anew(isola, end):
 
 @pytest.mark.slow
 def test_the_isola_is_gone_just_beyond_its_margin_and_there_before_it(isola):
-    margin = so.design_margin(isola, ["zeta", "p"])
+    margin = so.design_margin(isola, by=["zeta", "p"])
     assert margin.end.parameter("j") == pytest.approx(0.5, abs=1e-9)
     assert margin.distance == pytest.approx(np.hypot(*margin.scaled.values()))
     for share, there in ((0.97, True), (1.03, False)):
@@ -47,35 +47,35 @@ def test_the_isola_is_gone_just_beyond_its_margin_and_there_before_it(isola):
 
 
 def test_it_is_the_nearest_such_design(isola):
-    margin = so.design_margin(isola, ["zeta", "p", "j"])
+    margin = so.design_margin(isola, by=["zeta", "p", "j"])
     # the change points along the gradient of the birth, in scaled parameters
     known = so.sensitivity(margin.end)
     slope = np.array([known["zeta"]["j"] * 0.03, known["p"]["j"] * 0.55, -0.5])
     change = np.array(list(margin.scaled.values()))
     assert abs(change @ slope) == pytest.approx(np.linalg.norm(change) * np.linalg.norm(slope), rel=1e-8)
-    one = so.design_margin(isola, ["j"])
+    one = so.design_margin(isola, by=["j"])
     assert one.values["j"] == pytest.approx(float(isola.born))
     assert margin.distance < one.distance
 
 
 def test_scales_and_the_other_end(isola):
-    to_merging = so.design_margin(isola, ["j"], end="merges", scales={"j": 0.1})
+    to_merging = so.design_margin(isola, by=["j"], end="merges", scales={"j": 0.1})
     assert to_merging.distance == pytest.approx((0.5 - float(isola.merges)) / 0.1)
-    coarse = so.design_margin(isola, ["zeta"], scales={"zeta": 0.3})
-    fine = so.design_margin(isola, ["zeta"])
+    coarse = so.design_margin(isola, by=["zeta"], scales={"zeta": 0.3})
+    fine = so.design_margin(isola, by=["zeta"])
     assert coarse.distance == pytest.approx(fine.distance / 10.0)
     assert coarse.linear == pytest.approx(fine.linear / 10.0)
 
 
 def test_what_has_no_margin_is_refused(isola):
     for arguments, words in (
-        ({"parameters": ["zetta"]}, "did you mean 'zeta'"),
-        ({"parameters": []}, "is empty"),
-        ({"parameters": ["p"], "at": 0.9}, "exists from 0.177"),
-        ({"parameters": ["p"], "end": "birth"}, "'born' or 'merges'"),
-        ({"parameters": ["p"], "scales": {"p": 0.0}}, "give scales"),
+        ({"by": ["zetta"]}, "did you mean 'zeta'"),
+        ({"by": []}, "is empty"),
+        ({"by": ["p"], "at": 0.9}, "exists from 0.177"),
+        ({"by": ["p"], "end": "birth"}, "'born' or 'merges'"),
+        ({"by": ["p"], "scales": {"p": 0.0}}, "give scales"),
     ):
         with pytest.raises(so.InputError, match=words):
             so.design_margin(isola, **arguments)
     with pytest.raises(so.InputError, match="must be an Isola"):
-        so.design_margin(0.5, ["p"])
+        so.design_margin(0.5, by=["p"])

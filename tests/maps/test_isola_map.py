@@ -31,7 +31,7 @@ def reference(**values):
 
 @pytest.fixture(scope="module")
 def isolas():
-    return so.find_isolas(reference(), OMEGA, "j", (0.0, 1.0), HARMONICS, values=[0.1])
+    return so.find_isolas(reference(), OMEGA, "j", (0.0, 1.0), harmonics=HARMONICS, values=[0.1])
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +48,7 @@ def map_over(isolas):
 @pytest.mark.parametrize(("name", "value"), CASES)
 def test_birth_and_merging_by_searches_of_their_own(map_over, name, value):
     """Nothing of the map goes into such a search: it begins with responses at other values of the parameter."""
-    found = so.find_isolas(reference(**{name: value}), OMEGA, "j", (0.0, 1.0), HARMONICS, values=[0.1])
+    found = so.find_isolas(reference(**{name: value}), OMEGA, "j", (0.0, 1.0), harmonics=HARMONICS, values=[0.1])
     (isola,) = (one for one in found if one.nu == 2)
     ((low, high),) = map_over(name).ranges(value)
     assert (low, high) == pytest.approx((float(isola.merges), float(isola.born)), abs=2e-5)

@@ -160,7 +160,7 @@ def test_a_system_without_any():
         loads=[so.HarmonicLoad(dof=0, amplitude="F")],
         parameters={"F": 0.3},
     )
-    isolas = so.find_isolas(system, (0.8, 2.0), "F", (0.1, 0.4), 3, values=2)
+    isolas = so.find_isolas(system, (0.8, 2.0), "F", (0.1, 0.4), harmonics=3, values=2)
     assert list(isolas) == []
     assert "No isola of T" in repr(isolas)
     assert isolas.limit_points
@@ -363,7 +363,7 @@ def small_search(seconds=None, search=(), seeds=None):
         (0.5, 3.0),
         "F",
         (0.2, 1.0),
-        3,
+        harmonics=3,
         values=2,
         depth=0,
         levels=(),
@@ -451,7 +451,7 @@ def between_stops():
 )
 def test_a_loop_between_pitchforks_of_the_response_is_no_isola(system, omega, bounds, harmonics):
     """It closes on itself, and every sweep that passes one of its branch points comes to it."""
-    isolas = so.find_isolas(system, omega, "F", bounds, harmonics, values=3, levels=(), search=())
+    isolas = so.find_isolas(system, omega, "F", bounds, harmonics=harmonics, values=3, levels=(), search=())
     assert list(isolas) == []
     assert isolas.limit_points
 
@@ -464,9 +464,11 @@ def test_a_static_load_makes_such_a_loop_an_isola():
     the response lead to them: no response begins on them.
     """
     system = hardening(static=0.01)
-    isolas = so.find_isolas(system, (0.5, 1.2), "F", (0.5, 3.0), 9, values=[3.0], levels=(1.5,), search=())
+    isolas = so.find_isolas(system, (0.5, 1.2), "F", (0.5, 3.0), harmonics=9, values=[3.0], levels=(1.5,), search=())
     assert [isola.born.kind for isola in isolas] == ["isola_centre"] * 2
-    sweeps = [so.frequency_response(system.with_parameters(F=2.5), ends, 9) for ends in ((0.4, 1.4), (1.4, 0.4))]
+    sweeps = [
+        so.frequency_response(system.with_parameters(F=2.5), ends, harmonics=9) for ends in ((0.4, 1.4), (1.4, 0.4))
+    ]
     for isola in isolas:
         loop = isola.at(2.5)
         assert loop.closed
@@ -481,7 +483,7 @@ def test_a_true_isola_of_unsymmetric_motions_stays():
     """Period-2 motions of the symmetric oscillator, isolated from all others, come in pairs: they are listed once."""
     system = so.library.duffing(c=0.1)
     given = {"values": [5.0], "search": (2,), "levels": (), "depth": 0, "seeds": so.Seeds(8, 6, 1)}
-    (isola,) = so.find_isolas(system, (2.9, 4.0), "F", (4.0, 5.0), 5, **given)
+    (isola,) = so.find_isolas(system, (2.9, 4.0), "F", (4.0, 5.0), harmonics=5, **given)
     assert isola.born.kind == "isola_centre"
     loop = isola.at(4.8)
     image = mirrored(loop.orbits[len(loop) // 2])
@@ -492,7 +494,7 @@ def test_a_true_isola_of_unsymmetric_motions_stays():
 def test_what_hangs_on_an_isola_is_part_of_it():
     """The symmetric 3T isola at F = 200 has four pitchforks; the loops between them turn back there, it does not."""
     system = so.library.duffing(c=0.1).with_parameters(F=200.0)
-    start = so.periodic_orbit(system, 3.1987, [5.656, -25.978], 3)
+    start = so.periodic_orbit(system, 3.1987, state=[5.656, -25.978], subharmonic=3)
     isola = so.continue_branch(start, "omega", (1.0, 5.0))
     assert isola.closed
     assert len(isola.bifurcations["BP"]) == 4
@@ -530,7 +532,7 @@ def test_notes_of_searches_under_other_loads_are_kept(monkeypatch):
 
     monkeypatch.setattr(catalogue, "track", fails)
     given = {"values": [0.05], "levels": (6.0,), "search": (), "depth": 0}
-    isolas = so.find_isolas(so.library.duffing(c=0.1, F=0.05), (0.6, 2.0), "F", (0.01, 0.051), 3, **given)
+    isolas = so.find_isolas(so.library.duffing(c=0.1, F=0.05), (0.6, 2.0), "F", (0.01, 0.051), harmonics=3, **given)
     assert len(isolas.notes) == 2
     for note in isolas.notes:
         assert note.startswith("at F = 0.05, looking at 6 times the loads: the LP at omega = ")

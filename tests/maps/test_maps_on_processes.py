@@ -48,8 +48,10 @@ def test_wrong_numbers_of_processes_are_refused():
 
 
 def test_a_regime_map_on_two_processes_is_that_of_one():
-    asked = so.library.duffing(c=0.1, F=0.3), (0.8, 2.2), "F", (0.1, 0.4), 3
-    one, two = (so.regime_map(*asked, depth=0, values=2, search=(3,), workers=workers) for workers in (1, 2))
+    asked = so.library.duffing(c=0.1, F=0.3), (0.8, 2.2), "F", (0.1, 0.4)
+    one, two = (
+        so.regime_map(*asked, harmonics=3, depth=0, values=2, search=(3,), workers=workers) for workers in (1, 2)
+    )
     assert len(one.curves) == 2
     assert digests(two) == digests(one)
     assert two.notes == one.notes

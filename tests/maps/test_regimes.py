@@ -133,13 +133,13 @@ def test_the_whole_plane_of_the_reference_oscillator():
     system = so.library.reference_oscillator(regularization=3000.0)
     first = so.regime_map(system, (1.3, 4.5), "j", (0.0, 1.0))
     assert first.notes == ()
-    checked = first.check(200, 0)
+    checked = first.check(points=200, seed=0)
     assert checked.rate > 0.9
     assert {one.verdict for one in checked.disagreements} == {"unknown motion"}
     second = so.regime_map(
         system, (1.3, 4.5), "j", (0.0, 1.0), motions=[orbit for orbit in checked.unknown() if orbit.basis.nu in (3, 5)]
     )
-    again = second.check(200, 0)
+    again = second.check(points=200, seed=0)
     assert again.rate > 0.98
     assert {3, 5} <= {nu for regime in second.regimes for nu in regime.periods}
 
@@ -221,7 +221,7 @@ def test_a_branch_point_uses_up_no_period_doubling(ueda):
 def test_a_branch_of_twice_the_period_that_leads_elsewhere_ends_isolation():
     """A closed branch is no isola where a 2T branch that leaves the response ends at one of its period doublings."""
     system = so.library.reference_oscillator(p=0.55, regularization=3000.0, j=0.0)
-    response = so.frequency_response(system, (4.5, 2.2), 9, max_step=0.3)
+    response = so.frequency_response(system, (4.5, 2.2), harmonics=9, max_step=0.3)
     doublings = response.bifurcations["PD"]
     branch = so.switch_branch(doublings[0], max_step=0.3)
     assert branch.arrives is not None
@@ -254,7 +254,7 @@ def test_a_check_where_something_is_at_rest(case):
     else:
         mass, damping, stiffness, parts = 1.0, 0.1, 1.0, ([so.Expression(0, "F*x*cos(omega*t) + x**3")], [])
     system = so.System(mass, damping, stiffness, *parts, parameters={"F": 0.2})
-    found = so.regime_map(system, (1.5, 2.5), "F", (0.1, 0.4), 5, depth=1, values=2)
+    found = so.regime_map(system, (1.5, 2.5), "F", (0.1, 0.4), harmonics=5, depth=1, values=2)
     checked = found.check(points=4)
     assert checked.landings
     assert checked.rate == checked.agreeing == 1.0

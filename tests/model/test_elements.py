@@ -89,7 +89,7 @@ def test_a_wrong_derivative_is_found(element):
 
 def test_the_checker_looks_where_it_is_told():
     element = ElasticStop(0, stiffness="k", gap="b")
-    assert check_derivatives(element, {"k": 2.0, "b": 0.5}, u=[0.0, 1.0], v=[0.0, 0.0]).ok
+    assert check_derivatives(element, parameters={"k": 2.0, "b": 0.5}, u=[0.0, 1.0], v=[0.0, 0.0]).ok
     with pytest.raises(InputError, match="equal length"):
         check_derivatives(CubicSpring(0, 1.0), u=[0.0, 1.0], v=[0.0])
 
@@ -192,7 +192,7 @@ def test_samplings_tell_the_truth():
     told = smooth.sampling(smooth.coefficient_values(values))
     assert isinstance(told, SharpSampling)
     assert (told.points, told.widths) == ((0.4,), (0.02,))
-    assert check_derivatives(smooth, values).errors["arctan steps"] < 1e-12
+    assert check_derivatives(smooth, parameters=values).errors["arctan steps"] < 1e-12
     assert PolynomialSpring(0, [1.0, 0.0, 2.0, 0.0, 1.0]).sampling(np.ones(3)).degree == 5
 
 

@@ -44,7 +44,7 @@ def test_the_reference_oscillator_in_two_spellings():
         assert kinds == ["CubicSpring", "ElasticStop", "ElasticStop"]
         assert {e.side for e in system.elements if isinstance(e, so.ElasticStop)} == {"left", "right"}
         np.testing.assert_allclose(forces(system)[3], forces(by_hand)[3], atol=1e-13)
-        ours, theirs = (so.frequency_response(s, (3.0, 1.6), 9) for s in (system, by_hand))
+        ours, theirs = (so.frequency_response(s, (3.0, 1.6), harmonics=9) for s in (system, by_hand))
         np.testing.assert_allclose(ours.omega, theirs.omega, rtol=1e-9)
         np.testing.assert_allclose(ours.amplitude, theirs.amplitude, rtol=1e-9)
         assert [b.kind for b in ours.bifurcations] == [b.kind for b in theirs.bifurcations]

@@ -62,7 +62,7 @@ def test_transmissibility(coordinates):
     system = so.System(
         1.0, 2 * zeta, 1.0, loads=[so.BaseDisplacement("Y", coordinates=coordinates)], parameters={"Y": 0.3}
     )
-    curve = so.frequency_response(system, (0.3, 3.0), 1)
+    curve = so.frequency_response(system, (0.3, 3.0), harmonics=1)
     base = 0.3 if coordinates == "relative" else 0.0
     ratio = np.array([abs(p.harmonic(1) + base) / 0.3 for p in curve.orbits])
     w = curve.omega
@@ -74,7 +74,7 @@ def test_unbalance_response_of_a_rotor():
     """A Jeffcott rotor whirls in a circle of radius `e omega^2 / |k/m - omega^2 + i omega c/m|`."""
     rotor = so.library.jeffcott_rotor(clearance=None)
     m, c, k, me = (rotor.parameters[name] for name in ("m", "c", "k", "me"))
-    curve = so.frequency_response(rotor, (0.3, 2.5), 1)
+    curve = so.frequency_response(rotor, (0.3, 2.5), harmonics=1)
     w = curve.omega
     exact = me * w**2 / np.abs(k - m * w**2 + 1j * w * c)
     np.testing.assert_allclose([abs(o.harmonic(1, 0)) for o in curve.orbits], exact, rtol=1e-8)

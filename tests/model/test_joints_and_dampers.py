@@ -36,7 +36,7 @@ def force(element, u, v=0.0):
 
 @pytest.mark.parametrize("element", LAWS, ids=repr)
 def test_all_derivatives_to_third_order_agree_with_differences(element):
-    report = so.check_derivatives(element, rtol=2e-6)
+    report = so.check_derivatives(element, tolerance=2e-6)
     assert report.ok, str(report)
     own = not isinstance(element, so.Callable)  # whose third derivatives are differences
     assert ("f_uuu" in report.errors) == own
@@ -55,7 +55,7 @@ class DampedSpring(WrittenElement):
 
 def test_a_written_law_keeps_the_order_of_its_coefficients():
     element = DampedSpring(0, [2.0, "d"])
-    assert so.check_derivatives(element, {"d": 0.1}), so.check_derivatives(element, {"d": 0.1})
+    assert so.check_derivatives(element, parameters={"d": 0.1}), so.check_derivatives(element, parameters={"d": 0.1})
     u, v, c = np.array([0.7]), np.array([-0.3]), element.coefficient_values({"d": 0.1})
     assert element.tangent(u, v, c)[0] == pytest.approx(2.0 * 0.7**3 - 0.1 * 0.3)
     np.testing.assert_allclose(element.coefficient_tangent(u, v, c)[0], [u**3, v])
@@ -99,7 +99,9 @@ def test_a_function_with_its_derivatives_gives_what_the_text_gives():
     """x |x|^3 as a function of NumPy's `abs`, which bears no complex steps, and as a text: the same motion."""
     function = so.Callable(0, lambda x, v: x * np.abs(x) ** 3, derivatives=lambda x, v: (4 * np.abs(x) ** 3, 0 * x))
     text = so.Expression(0, "x*abs(x)**3")
-    one, other = (so.frequency_response(system_with(law), (1.0, 1.02), 7).orbits[0] for law in (function, text))
+    one, other = (
+        so.frequency_response(system_with(law), (1.0, 1.02), harmonics=7).orbits[0] for law in (function, text)
+    )
     np.testing.assert_allclose(one.coefficients, other.coefficients, rtol=1e-9, atol=1e-11)
 
 

@@ -46,7 +46,7 @@ CASES = [
 @pytest.mark.parametrize(("text", "inputs", "kind"), CASES, ids=[case[0] for case in CASES])
 def test_all_derivatives_agree_with_differences_and_the_law_is_known_for_what_it_is(text, inputs, kind):
     element = so.Expression(0, text, inputs)
-    report = so.check_derivatives(element, VALUES)
+    report = so.check_derivatives(element, parameters=VALUES)
     assert report.ok, str(report)
     assert any(name.startswith("f_u0u0u0") for name in report.errors)
     c = element.coefficient_values({name: VALUES[name] for name in element.coefficient_names})

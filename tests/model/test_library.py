@@ -36,7 +36,7 @@ SYSTEMS = [
 @pytest.mark.parametrize("system", SYSTEMS, ids=lambda s: s.name)
 def test_every_element_of_every_system_has_right_derivatives(system):
     for element in system.elements:
-        report = check_derivatives(element, system.parameters)
+        report = check_derivatives(element, parameters=system.parameters)
         assert report.ok, str(report)
 
 

@@ -34,7 +34,7 @@ def test_what_touches_pushes_back(element):
 
 def test_a_stiffness_may_be_followed_to_zero_and_not_beyond():
     system = one(so.ElasticStop(0, "k", 0.2), k=2.0)
-    start = so.frequency_response(system, (0.8, 0.81), 3).orbits[0]
+    start = so.frequency_response(system, (0.8, 0.81), harmonics=3).orbits[0]
     with pytest.raises(InputError, match=r"at k=-1 .*the stiffness is -1"):
         so.continue_branch(start, "k", (-1.0, 2.0))
     curve = so.continue_branch(start, "k", (0.0, 2.0), max_step=0.3)
@@ -58,7 +58,7 @@ def test_a_spring_that_softens_beyond_a_gap_is_a_text():
         [*LOADS, so.HarmonicLoad(0, -0.15, harmonic=0)],
     )
     assert [type(element).__name__ for element in read.elements] == ["Expression"]
-    amplitudes = [so.frequency_response(system, (1.3, 1.4), 9).amplitude[0] for system in (text, read, other)]
+    amplitudes = [so.frequency_response(system, (1.3, 1.4), harmonics=9).amplitude[0] for system in (text, read, other)]
     assert amplitudes == pytest.approx([amplitudes[2]] * 3, rel=1e-7)
     hardening = so.System.from_equations("x'' + 0.1*x' + x + s*max(x - 0.3, 0) = cos(omega*t)", {"s": 0.5})
     assert isinstance(hardening.elements[0], so.ElasticStop)
@@ -77,7 +77,7 @@ def test_starts_of_another_shape_are_refused_with_the_shapes(start):
     with pytest.raises(
         InputError, match=r"length 2, or coefficients of shape \(2 H \+ 1, 1\), H at least 1; got an array"
     ):
-        so.frequency_response(system, (0.8, 1.2), 5, start=start)
+        so.frequency_response(system, (0.8, 1.2), harmonics=5, start=start)
 
 
 @pytest.mark.parametrize(

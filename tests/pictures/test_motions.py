@@ -53,7 +53,7 @@ def swinging():
     x = np.zeros((basis.size, 1))
     x[1:3, 0] = amplitude * math.cos(phi), -amplitude * math.sin(phi)
     guess = so.PeriodicOrbit(so.HarmonicBalance(beam, basis), x, 2.0, dict(beam.parameters), 0.0)
-    return so.frequency_response(beam, (2.0, 2.1), 5, start=guess)
+    return so.frequency_response(beam, (2.0, 2.1), harmonics=5, start=guess)
 
 
 def _beam():
@@ -122,8 +122,8 @@ def test_gaps_are_those_of_elements_on_this_dof_alone():
 
 def test_neglected_components_are_what_more_harmonics_find():
     duffing = so.library.duffing(c=0.1, F=0.3)
-    few = so.frequency_response(duffing, (0.9, 0.8), 3).orbits[0]
-    many = so.frequency_response(duffing, (0.9, 0.8), 15).orbits[0]
+    few = so.frequency_response(duffing, (0.9, 0.8), harmonics=3).orbits[0]
+    many = so.frequency_response(duffing, (0.9, 0.8), harmonics=15).orbits[0]
     estimated = motion_dataset(few)["amplitude_of_neglected"].to_numpy()
     solved = np.array([many.harmonic(k) for k in (5, 7)])
     assert abs(estimated[[1, 3]] - solved) == pytest.approx(0.0, abs=0.1 * abs(solved[0]))

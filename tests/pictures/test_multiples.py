@@ -14,13 +14,13 @@ from suboctave.pictures import plot, plot_space
 def loaded():
     """x'' + 0.1 x' + 2 x = 3 + cos(omega t): a mean of 3/2, |1/(2 - omega^2 + 0.1 i omega)| around it."""
     system = so.System.from_equations("x'' + 0.1*x' + 2*x = 3 + F*cos(omega*t)", {"F": 1.0})
-    return so.frequency_response(system, (2.0, 1.0), 2)
+    return so.frequency_response(system, (2.0, 1.0), harmonics=2)
 
 
 @pytest.fixture(scope="module")
 def tripled():
     system = so.System.from_equations("x'' + 0.02*x' + x + 0.05*x**3 = F*cos(omega*t)", {"F": 5.0})
-    return so.frequency_response(system, (5.0, 5.3), 9, subharmonic=3)
+    return so.frequency_response(system, (5.0, 5.3), harmonics=9, subharmonic=3)
 
 
 def drawn(figure, among=0):

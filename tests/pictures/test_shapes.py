@@ -109,7 +109,7 @@ def test_a_motion_is_a_gif_that_lasts_as_long_as_it_should(cantilever, tmp_path)
     two = join(cantilever, cantilever, names=["upper", "lower"], places=[[0.0, 0.0, 0.0], [0.0, 0.0, -0.1]])
     angles = 2.0 * np.pi * np.arange(7) / 7
     path = so.animate_shape(
-        two, np.outer(np.cos(angles + 0.3), np.ones(two.n)), tmp_path / "new" / "two.gif", seconds=1.0
+        two, np.outer(np.cos(angles + 0.3), np.ones(two.n)), tmp_path / "new" / "two.gif", duration=1.0
     )
     with Image.open(path) as picture:
         assert picture.n_frames == 7
@@ -129,14 +129,14 @@ def test_fields_go_to_pyvista_and_vtu(cantilever, tmp_path):
     fields = {"first": modes[:, 0], "second": modes[:, 1]}
     grid = so.to_pyvista(cantilever, fields)
     assert (grid.n_points, grid.n_cells) == (11, 10)
-    path = so.write_vtu(tmp_path / "modes.vtu", cantilever, fields)
+    path = so.write_vtu(cantilever, fields, tmp_path / "modes.vtu")
     read = meshio.read(path)
     for name, field in fields.items():
         assert_allclose(grid.point_data[name], nodal_displacements(cantilever, field))
         assert_allclose(read.point_data[name], nodal_displacements(cantilever, field))
     assert_allclose(read.points, cantilever.mesh.points)
     with pytest.raises(so.InputError, match="left as it is"):
-        so.write_vtu(path, cantilever, fields)
+        so.write_vtu(cantilever, fields, path)
 
 
 @pytest.mark.parametrize(
@@ -149,7 +149,7 @@ def test_fields_go_to_pyvista_and_vtu(cantilever, tmp_path):
         (lambda s, _: so.plot_shape(so.Structure(s.mass, s.stiffness), np.zeros(s.n)), "no mesh"),
         (lambda s, _: so.animate_shape(s, np.zeros((3, s.n)), "a.mp4"), ".gif files"),
         (lambda s, path: so.plot_shape(s, np.zeros(s.n), path / "a.txt"), "suffix"),
-        (lambda s, path: so.write_vtu(path / "a.vtu", s, {"two": np.zeros((2, s.n))}), "'two' is an array"),
+        (lambda s, path: so.write_vtu(s, {"two": np.zeros((2, s.n))}, path / "a.vtu"), "'two' is an array"),
     ],
 )
 def test_mistakes(cantilever, call, text, tmp_path):
@@ -165,7 +165,7 @@ def test_a_missing_package_is_named(cantilever, monkeypatch, tmp_path, package, 
     monkeypatch.setitem(__import__("sys").modules, package, None)
     given = (cantilever, {"one": np.zeros(cantilever.n)})
     with pytest.raises(so.InputError, match=r"pip install suboctave\[fe\]"):
-        so.write_vtu(tmp_path / "a.vtu", *given) if call == "write_vtu" else so.to_pyvista(*given)
+        so.write_vtu(*given, tmp_path / "a.vtu") if call == "write_vtu" else so.to_pyvista(*given)
 
 
 def test_motions_are_taken_as_they_are(tmp_path):

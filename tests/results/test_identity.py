@@ -150,7 +150,7 @@ def test_coexisting_mirror_images_are_counted_each(cubic):
 def test_a_search_finds_both_partners_of_a_pair():
     """The 2T isola of the Duffing oscillator exists twice: motions of even order have no odd symmetry."""
     system = so.library.duffing(c=0.1).with_parameters(F=5.0)
-    found = so.find_subharmonics(system, (2.0, 4.5), 2)
+    found = so.find_subharmonics(system, (2.0, 4.5), subharmonic=2)
     assert len(found) == 2
     assert all(branch.closed and branch.nu == 2 for branch in found)
     images = [mirrored(orbit) for orbit in found[0].orbits[::5]]
@@ -158,7 +158,7 @@ def test_a_search_finds_both_partners_of_a_pair():
 
 
 def test_a_diagram_follows_what_leaves_mirrored_doublings(cubic):
-    diagram = so.bifurcation_diagram(cubic, (1.6, 0.9), 2)
+    diagram = so.bifurcation_diagram(cubic, (1.6, 0.9), depth=2)
     doubled = [node.branch for node in diagram if node.branch.nu == 2]
     assert len(doubled) == 2
     image = mirrored(doubled[0].orbits[len(doubled[0]) // 2])

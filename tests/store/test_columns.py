@@ -19,7 +19,7 @@ from suboctave.study.screen import print_events
 def along(name):
     """x'' + 0.1 x' + x = NAME cos(omega t) at omega = 1: the amplitude is ten times the parameter."""
     system = so.System(1.0, 0.1, 1.0, [], [so.HarmonicLoad(0, name)], parameters={name: 0.1})
-    start = so.frequency_response(system, (1.0, 1.01), 1).orbits[0]
+    start = so.frequency_response(system, (1.0, 1.01), harmonics=1).orbits[0]
     return so.continue_branch(start, name, (0.05, 0.3), max_step=0.5)
 
 
@@ -49,7 +49,7 @@ def test_free_parameters_are_in_tables_datasets_and_files(name, tmp_path):
 @pytest.mark.parametrize("name", ["amplitude", "remark", *slow("kind", "criticality", "residual", "F")])
 def test_tables_of_bifurcations_have_every_parameter(name):
     system = so.System(1.0, 0.1, 1.0, [so.CubicSpring(0, 1.0)], [so.HarmonicLoad(0, name)], parameters={name: 0.3})
-    curve = so.frequency_response(system, (1.5, 1.2), 3)
+    curve = so.frequency_response(system, (1.5, 1.2), harmonics=3)
     frame = curve.bifurcations_frame()
     assert frame["kind"].tolist() == ["LP"]
     assert frame["amplitude"].tolist() == [b.amplitude for b in curve.bifurcations]

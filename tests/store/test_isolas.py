@@ -25,7 +25,15 @@ def duffing():
 @pytest.fixture(scope="module")
 def found():
     isolas = so.find_isolas(
-        duffing(), (2.5, 9.0), "F", (0.1, 5.0), 3, search=(3,), values=[5.0], stability=so.Hill(), max_step=0.2
+        duffing(),
+        (2.5, 9.0),
+        "F",
+        (0.1, 5.0),
+        harmonics=3,
+        search=(3,),
+        values=[5.0],
+        stability=so.Hill(),
+        max_step=0.2,
     )
     isolas[0].at(4.0)
     return isolas
@@ -114,7 +122,7 @@ def test_a_part_that_is_missing(found, tmp_path):
 
 
 def test_none_found_is_a_result_too(tmp_path):
-    isolas = so.find_isolas(duffing(), (1.5, 2.0), "F", (0.01, 0.02), 1, values=2, depth=0, search=())
+    isolas = so.find_isolas(duffing(), (1.5, 2.0), "F", (0.01, 0.02), harmonics=1, values=2, depth=0, search=())
     assert not isolas
     again = so.load(isolas.save(tmp_path / "none.nc"))
     assert repr(again) == repr(isolas)

@@ -101,7 +101,8 @@ def test_one_basis_serves_all_responses():
     """What a system at another gap, or a further curve, asks for has been made; nobody's basis changes under him."""
     system = beam(40)
     one, again, other = (
-        so.condense(system.with_parameters(j=j), 2.6, harmonics) for j, harmonics in ((0.2, 15), (0.4, 15), (0.2, 30))
+        so.condense(system.with_parameters(j=j), 2.6, harmonics=harmonics)
+        for j, harmonics in ((0.2, 15), (0.4, 15), (0.2, 30))
     )
     assert again.reduction is one.reduction
     assert other.reduction is not one.reduction

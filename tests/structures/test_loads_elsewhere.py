@@ -56,7 +56,7 @@ def test_one_unknown_and_the_same_events(pair):
 def test_residual_and_its_derivatives():
     """Loads by omega, by what they depend on, and by a parameter of the stiffness; twice by each of two."""
     system = many()
-    linear = so.condense(system, 1.0, 5)
+    linear = so.condense(system, 1.0, harmonics=5)
     balance = HarmonicBalance(system, HarmonicBasis(5), linear=linear)
     x, values, step = 0.4 * np.random.default_rng(3).normal(size=(11, 1)), dict(system.parameters), 1e-5
 
@@ -121,7 +121,9 @@ def test_peaks_where_no_element_acts(dof):
 
 def test_phases_of_loads_elsewhere():
     """A linear chain's displacement at the load lags by a quarter of the period."""
-    curve = so.phase_resonance(chain(gap=50.0), "p", (0.4, 0.6), omega=(0.3, 0.6), harmonics=5, observe=1)
+    curve = so.phase_resonance(
+        chain(gap=50.0), parameter="p", bounds=(0.4, 0.6), omega=(0.3, 0.6), harmonics=5, observe=1
+    )
     assert curve.orbits[-1].balance.size == 2
     for orbit in (curve.orbits[0], curve.orbits[-1]):
         assert np.angle(orbit.harmonic(1, 1)) == pytest.approx(-0.5 * np.pi, abs=1e-8)

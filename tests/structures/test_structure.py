@@ -396,7 +396,7 @@ def test_modal_damping_of_a_large_structure():
     ratios = np.einsum("im,im->m", found.modes, system.damping.sparse_value({}) @ found.modes) / (2.0 * found.omega)
     np.testing.assert_allclose(ratios[:30], 0.01, rtol=1e-6)
     np.testing.assert_allclose(ratios[30:], 0.01 * found.omega[30:] / found.omega[29], rtol=1e-6)
-    linear = so.condense(system, 1.2, 9)
+    linear = so.condense(system, 1.2, harmonics=9)
     assert linear.error < 1e-8
     curve = so.frequency_response(system, (0.9, 1.2), harmonics=9, linear=linear)
     assert curve.bifurcations["LP"]
@@ -453,7 +453,7 @@ def test_a_stop_that_is_never_reached_leaves_the_linear_response(structure, chai
         loads=[so.HarmonicLoad(dof=structure.dof(1042, "z"), amplitude=0.2)],
         damping=so.Rayleigh(0.05, 0.01),
     )
-    orbit = so.periodic_orbit(system, 1.3, np.zeros(16))
+    orbit = so.periodic_orbit(system, 1.3, state=np.zeros(16))
     c = 0.05 * chain.mass + 0.01 * chain.stiffness
     exact = np.linalg.solve(chain.stiffness - 1.3**2 * chain.mass + 1.3j * c, 0.2 * np.eye(8)[1])
     assert orbit.amplitude(1) == pytest.approx(abs(exact[1]), rel=1e-9)

@@ -93,7 +93,7 @@ def test_as_by_a_script(ran):
     assert not outcome.failed
     found = so.load(folder / "results.nc")["isolas"]
     study = read_study(folder.parent / "study.toml")
-    isolas = so.find_isolas(study.system, (2.5, 9.0), "F", (0.1, 5.0), 3, values=[5.0], search=(3,))
+    isolas = so.find_isolas(study.system, (2.5, 9.0), "F", (0.1, 5.0), harmonics=3, values=[5.0], search=(3,))
     assert found[0].range == pytest.approx(isolas[0].range, rel=1e-9)
     assert found[0].known[4.0].omega == pytest.approx(isolas[0].at(4.0).omega, rel=1e-9)
     assert found.notes == ("no isola was found at F = 1",)

@@ -46,7 +46,7 @@ def test_as_by_a_script(study_file, suboctave):
     assert status == 0, err
     table = so.load(path.parent / "study_results" / "results.nc")["regimes"]
     study = read_study(path)
-    expected = so.regime_map(study.system, (2.0, 0.8), "F", (0.05, 0.4), 1, depth=0, values=2).to_table()
+    expected = so.regime_map(study.system, (2.0, 0.8), "F", (0.05, 0.4), harmonics=1, depth=0, values=2).to_table()
     assert list(table.columns) == list(expected.columns)
     for name in ("period", "F", "from omega", "to omega"):
         np.testing.assert_allclose(table[name], expected[name], rtol=1e-9)

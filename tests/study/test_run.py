@@ -148,7 +148,7 @@ def test_every_option_of_a_verb_reaches_it(study_file, equal):
         so.frequency_response,
         study.system,
         (3.0, 0.5),
-        so.AdaptiveHarmonics(minimum=7, tolerance=1e-6),
+        harmonics=so.AdaptiveHarmonics(minimum=7, tolerance=1e-6),
         start=[0.05, 0.0],
         max_step=0.3,
         newton=so.NewtonOptions(iterations=9),

@@ -23,7 +23,7 @@ def test_the_study_of_the_page_gives_what_a_script_gives(study_file, suboctave):
     table = results["birth"].to_dataframe().set_index("parameter")
     for name in by_script:
         assert table.loc[name, "d j"] == pytest.approx(by_script[name]["j"], rel=1e-6)
-    margin = so.design_margin(isola, ["zeta", "Kc", "p"], at=0.5)
+    margin = so.design_margin(isola, by=["zeta", "Kc", "p"], at=0.5)
     assert results["margin"]["gone_at"] == pytest.approx(list(margin.values.values()), rel=1e-6)
     assert f"{margin.distance:.6g}" in out
 

@@ -34,7 +34,7 @@ def test_as_by_a_script(study_file, suboctave):
     assert status == 0, err
     found = so.load(path.parent / "study_results" / "results.nc")["limits"]
     study = read_study(path)
-    response = so.frequency_response(study.system, (3.0, 0.5), 3)
+    response = so.frequency_response(study.system, (3.0, 0.5), harmonics=3)
     curve = so.track(response.bifurcations["LP"][1], "F", (0.05, 0.5))
     assert found.kind == "LP"
     assert found.omega == pytest.approx(curve.omega, rel=1e-9)

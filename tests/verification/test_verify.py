@@ -45,7 +45,7 @@ def test_a_missing_harmonic_is_seen(duffing_curve):
 
 def test_too_few_harmonics_are_seen():
     """With one harmonic a motion of the order of the strong spring's length is a percent off."""
-    curve = so.frequency_response(so.library.duffing(c=0.1, F=5.0), (1.2, 1.5), 1)
+    curve = so.frequency_response(so.library.duffing(c=0.1, F=5.0), (1.2, 1.5), harmonics=1)
     check = so.verify(curve.orbits[0])
     assert not check.agrees
     assert check.distance > 1e-3

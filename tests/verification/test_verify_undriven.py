@@ -27,7 +27,7 @@ def cycles():
 
 def mode(damping=0.0, size=3.0):
     system = so.System(np.eye(2), damping * STIFFNESS, STIFFNESS, elements=[so.CubicSpring(0, 0.5)])
-    return so.nonlinear_mode(system, 1, amplitude=(0.01, size))
+    return so.nonlinear_mode(system, mode=1, amplitude=(0.01, size))
 
 
 def spoilt(curve, index):
@@ -102,7 +102,7 @@ def test_a_condensed_damped_structure():
     n = 4
     chain = 2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
     system = so.System(np.eye(n), 0.1 * chain, chain, [so.CubicSpring(0, 1.0)])
-    curve = so.nonlinear_mode(system, 2, amplitude=(0.05, 0.5), harmonics=7)
+    curve = so.nonlinear_mode(system, mode=2, amplitude=(0.05, 0.5), harmonics=7)
     assert curve.orbits[0].balance.size == 1
     check = so.verify(curve, points=3)
     assert all(point.agrees and point.distance < 1e-4 for point in check.points), check

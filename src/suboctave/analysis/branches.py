@@ -57,8 +57,8 @@ from suboctave.results.equilibria import as_equilibria
 def frequency_response(
     system: System,
     omega: tuple[float, float],
-    harmonics: Harmonics = "adaptive",
     *,
+    harmonics: Harmonics = "adaptive",
     start: Any = None,
     subharmonic: int | None = None,
     linear: LinearPart | None = None,
@@ -191,7 +191,7 @@ def _from_system(
     if parameter == "omega":
         if omega is not None:
             raise InputError("along omega, omega= cannot be kept as well: leave it out, the range is in bounds")
-        return frequency_response(system, bounds, wanted, **options)
+        return frequency_response(system, bounds, harmonics=wanted, **options)
     check_system(system)
     check_parameter(system, parameter)
     first, last = check_bounds(system, parameter, bounds)
@@ -266,8 +266,8 @@ _NO_OTHER = {
 @timed
 def switch_branch(
     bifurcation: Bifurcation,
-    side: int | None = None,
     *,
+    side: int | None = None,
     bounds: tuple[float, float] | None = None,
     harmonics: Harmonics | None = None,
     **options: Unpack[CurveOptions],

@@ -82,8 +82,8 @@ class Followed:
 def bifurcation_diagram(
     system: System,
     omega: tuple[float, float],
-    depth: int = 2,
     *,
+    depth: int = 2,
     harmonics: Harmonics = "adaptive",
     max_branches: int = 32,
     start: Any = None,
@@ -169,7 +169,9 @@ class _Growth:
 
         def response(number: int, ends: tuple[float, float], title: str) -> Branch:
             options = self._reporting(0, 1, title)
-            return self._kept(number, -1, lambda: frequency_response(system, ends, harmonics, start=start, **options))
+            return self._kept(
+                number, -1, lambda: frequency_response(system, ends, harmonics=harmonics, start=start, **options)
+            )
 
         first = response(-1, omega, "T")
         root = DiagramBranch(first)

@@ -53,8 +53,8 @@ _TOLD = 0.2
 @timed
 def limit_cycles(
     start: Bifurcation | BranchPoint | PeriodicOrbit,
-    bounds: tuple[float, float] | None = None,
     parameter: str | None = None,
+    bounds: tuple[float, float] | None = None,
     *,
     omega: tuple[float, float] | None = None,
     harmonics: int | str | AdaptiveHarmonics = "adaptive",

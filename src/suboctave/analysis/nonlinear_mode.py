@@ -62,8 +62,8 @@ Range = tuple[float, float]
 @timed
 def nonlinear_mode(
     system: System,
-    mode: int = 1,
     *,
+    mode: int = 1,
     amplitude: float | Range | None = None,
     energy: float | Range | None = None,
     omega: Range | None = None,

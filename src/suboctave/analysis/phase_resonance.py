@@ -32,12 +32,12 @@ from suboctave.results.branch import Branch, TrackedBranch
 @timed
 def phase_resonance(
     system: System,
-    amplitude: str,
+    omega: tuple[float, float],
+    parameter: str,
     bounds: tuple[float, float],
     *,
-    omega: tuple[float, float],
     harmonic: int = 1,
-    order: int = 1,
+    subharmonic: int = 1,
     harmonics: Harmonics = "adaptive",
     **options: Unpack[TrackOptions],
 ) -> TrackedBranch:
@@ -47,15 +47,15 @@ def phase_resonance(
 
     Parameters
     ----------
-    amplitude
-        The parameter over which it is followed: that of the load, or any other.
-    bounds
-        Its range (from, to), which holds the system's own value.
     omega
-        Where the resonance is looked for at that value, (from, to), rad per unit time. The backbone may leave it.
-    harmonic, order
-        The resonance of the observed displacement at `harmonic / order` omega: (1, 1) is the fundamental one, (3, 1)
-        superharmonic of order 3, (1, 3) subharmonic of order 3, along motions of `order` load periods.
+        Where the resonance is looked for at the system's own parameters, (from, to), rad per unit time. The backbone
+        may leave it.
+    parameter, bounds
+        The parameter over which it is followed, that of the load or any other, and its range (from, to), which holds
+        the system's own value.
+    harmonic, subharmonic
+        The resonance of the observed displacement at `harmonic / subharmonic` omega: (1, 1) is the fundamental one,
+        (3, 1) superharmonic of order 3, (1, 3) subharmonic of order 3, along motions of `subharmonic` load periods.
     harmonics
         As in `frequency_response`.
 
@@ -67,12 +67,12 @@ def phase_resonance(
         If no motion in quadrature is found in the range of omega.
     """
     check_is_system(system)
-    check_bounds(system, amplitude, bounds)
+    check_bounds(system, parameter, bounds)
     check_range("omega", omega, positive=True)
-    k, nu = check_count("harmonic", harmonic), check_count("order", order)
+    k, nu = check_count("harmonic", harmonic), check_count("subharmonic", subharmonic)
     if gcd(k, nu) > 1:
         raise InputError(
-            f"harmonic={k} and order={nu} have a common factor: {k // gcd(k, nu)}/{nu // gcd(k, nu)} is meant"
+            f"harmonic={k} and subharmonic={nu} have a common factor: {k // gcd(k, nu)}/{nu // gcd(k, nu)} is meant"
         )
     loads = sorted({one.harmonic for one in system.load_components() if one.harmonic})
     if loads != [1]:
@@ -81,9 +81,9 @@ def phase_resonance(
     plain = handed_on(options)
     plain.pop("formulation", None)
     given: Branch | Branches = (
-        frequency_response(system, omega, harmonics, **plain)
+        frequency_response(system, omega, harmonics=harmonics, **plain)
         if nu == 1
-        else find_subharmonics(system, omega, nu, harmonics, **plain)
+        else find_subharmonics(system, omega, subharmonic=nu, harmonics=harmonics, **plain)
     )
     # the resonance may lie on what is missing
     pass_on(given.interruption)
@@ -92,10 +92,10 @@ def phase_resonance(
     if not found:
         raise ConvergenceError(
             f"no motion has its harmonic at {k if nu == 1 else f'{k}/{nu}'} omega in quadrature with the load, for "
-            f"omega from {min(omega):g} to {max(omega):g}: widen the range, or change {amplitude} in the system"
+            f"omega from {min(omega):g} to {max(omega):g}: widen the range, or change {parameter} in the system"
         )
     _, start = max(found, key=lambda place: place[0])
-    return track(start, amplitude, bounds, onto={"name": "phase_resonance", "harmonic": k / nu}, **options)
+    return track(start, parameter, bounds, onto={"name": "phase_resonance", "harmonic": k / nu}, **options)
 
 
 def _in_quadrature(branch: Branch, k: int, nu: int) -> list[tuple[float, BranchPoint]]:

@@ -108,7 +108,7 @@ class Sensitivity(Mapping[str, Mapping[str, float]]):
 
 
 @checked
-def sensitivity(bifurcation: Bifurcation, parameters: str | Sequence[str] | None = None) -> Sensitivity:
+def sensitivity(bifurcation: Bifurcation, *, by: str | Sequence[str] | None = None) -> Sensitivity:
     """Derivatives of where a bifurcation lies, and of its amplitude, by the parameters that were held.
 
     Parameters
@@ -116,15 +116,15 @@ def sensitivity(bifurcation: Bifurcation, parameters: str | Sequence[str] | None
     bifurcation
         A located LP, BP, PD, NS or grazing of any branch; or an extremum of a tracked curve in two parameters, such as
         the birth of an isola or where it merges.
-    parameters
-        Which ones; by default all of the system, and omega where it is held.
+    by
+        The parameters; by default all of the system, and omega where it is held.
 
     Raises
     ------
     InputError
         Wrong input, before any work.
     """
-    free, held = _names(bifurcation, parameters)
+    free, held = _names(bifurcation, by)
     with one_thread():
         curve, u, moved = _moving(bifurcation, held)
         first = len(moved) - len(free)

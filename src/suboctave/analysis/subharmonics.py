@@ -72,9 +72,9 @@ def check_order(order: Any) -> int:
 def find_subharmonics(
     system: System,
     omega: tuple[float, float],
+    *,
     subharmonic: int,
     harmonics: Harmonics = "adaptive",
-    *,
     seeds: Seeds | None = None,
     linear: LinearPart | None = None,
     **options: Unpack[CurveOptions],
@@ -188,10 +188,10 @@ def subharmonic_start(curve: MotionProblem, run: CurveRun) -> Trace:
 def periodic_orbit(
     system: System,
     omega: float,
+    *,
     state: Any,
     subharmonic: int = 1,
     harmonics: Harmonics = "adaptive",
-    *,
     settle: int = 0,
     newton: NewtonOptions | None = None,
     seconds: Positive | None = None,
@@ -230,7 +230,11 @@ def periodic_orbit(
             given = np.concatenate((trajectory.x[-1], trajectory.v[-1]))
         point = start_point(curve, omega, given, newton or NewtonOptions())
     own = (orbit := Sample(point).orbit).own_period
-    return orbit if own == order else periodic_orbit(system, omega, orbit.start(), own, harmonics, newton=newton)
+    return (
+        orbit
+        if own == order
+        else periodic_orbit(system, omega, state=orbit.start(), subharmonic=own, harmonics=harmonics, newton=newton)
+    )
 
 
 # ------------------------------------------------------------------------------------------------------------- search

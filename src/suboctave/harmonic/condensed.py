@@ -416,6 +416,7 @@ def linear_part_of(
 def condense(
     system: System,
     omega: float | tuple[float, float],
+    *,
     harmonics: int = 15,
     observe: int | str | Sequence[int | str] = (),
 ) -> LinearPart:

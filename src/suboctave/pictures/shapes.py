@@ -90,7 +90,7 @@ def plot_shape(
 
 @with_options(ShapeOptions)
 def animate_shape(
-    structure: Structure, snapshots: Field, path: str | Path, seconds: float = 2.0, **options: Unpack[ShapeOptions]
+    structure: Structure, snapshots: Field, path: str | Path, *, duration: float = 2.0, **options: Unpack[ShapeOptions]
 ) -> Path:
     """Write a motion as a moving picture that repeats for ever.
 
@@ -103,15 +103,15 @@ def animate_shape(
         motion, a point of a branch, a bifurcation or its `critical_motion`, for 48 of them.
     path
         A .gif file; one that is there is replaced.
-    seconds
-        How long a period is shown.
+    duration
+        How long a period is shown, in seconds.
     """
     target = path_of(path)
     if target.suffix.lower() != ".gif":
         raise InputError(f"{target.name}: moving pictures are .gif files")
-    check_numbers(seconds=seconds)
-    if not seconds > 0.0:
-        raise InputError(f"seconds={seconds}: must be above 0")
+    check_numbers(duration=duration)
+    if not duration > 0.0:
+        raise InputError(f"duration={duration}: must be above 0")
     snapshots = snapshots if (motion := _instants(snapshots)) is None else motion
     if np.ndim(snapshots) != 2:
         raise InputError(f"snapshots are an array (T, {structure.n}), not of the shape {np.shape(snapshots)}")
@@ -131,7 +131,7 @@ def animate_shape(
             )
         )
     # GIF counts in hundredths of a second
-    instants = np.round(100.0 * seconds * np.arange(len(images) + 1) / len(images))
+    instants = np.round(100.0 * duration * np.arange(len(images) + 1) / len(images))
     durations = (10 * np.maximum(np.diff(instants), 2)).astype(int).tolist()
     more: dict[str, Any] = {"save_all": True, "append_images": images[1:], "duration": durations, "loop": 0}
     target.parent.mkdir(parents=True, exist_ok=True)

@@ -35,7 +35,7 @@ def to_pyvista(structure: Structure, fields: Mapping[str, Any]) -> Any:
 
 
 @checked
-def write_vtu(path: str | Path, structure: Structure, fields: Mapping[str, Any], overwrite: bool = False) -> Path:
+def write_vtu(structure: Structure, fields: Mapping[str, Any], path: str | Path, *, overwrite: bool = False) -> Path:
     """Write the mesh with displacements of its nodes as a .vtu file, which ParaView reads.
 
     `fields`: as of `to_pyvista`. Raises `InputError` where the file exists (`overwrite` replaces it), for fields of

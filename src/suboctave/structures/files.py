@@ -62,6 +62,7 @@ _BEGINNING = 1024
 @checked
 def read_structure(
     path: FileName | None = None,
+    *,
     stiffness: FileName | None = None,
     mass: FileName | None = None,
     damping: MatrixOrForm = None,

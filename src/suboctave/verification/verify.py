@@ -53,7 +53,7 @@ from suboctave.verification.shots import Shot, Shots
 
 @checked
 def stability(
-    orbit: PeriodicOrbit | BranchPoint | Bifurcation, method: StabilityMethod | str | None = None
+    orbit: PeriodicOrbit | BranchPoint | Bifurcation, *, method: StabilityMethod | str | None = None
 ) -> FloquetResult:
     """Floquet multipliers of a motion with error estimates and the verdict (`stable`, `decided`).
 
@@ -231,13 +231,13 @@ def _confirmed(item: Bifurcation, shot: Shot | None, tolerance: float, observe: 
 
 @overload
 def verify(
-    what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: Share = 1e-3, *, seconds: float | None = None
+    what: PeriodicOrbit | BranchPoint | Bifurcation, *, tolerance: Share = 1e-3, seconds: float | None = None
 ) -> Verification: ...
 @overload
 def verify(
     what: Branch,
-    tolerance: Share = 1e-3,
     *,
+    tolerance: Share = 1e-3,
     points: int | Iterable[int] | None = None,
     every: int = 1,
     bifurcations: bool = True,
@@ -249,8 +249,8 @@ def verify(
 @limited
 def verify(
     what: PeriodicOrbit | BranchPoint | Bifurcation | Branch,
-    tolerance: Share = 1e-3,
     *,
+    tolerance: Share = 1e-3,
     points: int | Iterable[int] | None = None,
     every: Count = 1,
     bifurcations: bool = True,

@@ -73,8 +73,8 @@ class DesignMargin:
 @limited
 def design_margin(
     isola: Isola,
-    parameters: str | Sequence[str],
     *,
+    by: str | Sequence[str],
     at: float | None = None,
     scales: Mapping[str, float] | None = None,
     end: str = "born",
@@ -86,8 +86,8 @@ def design_margin(
     ----------
     isola
         One of what `find_isolas` gives.
-    parameters
-        Which ones may change; the design parameter may be among them.
+    by
+        The parameters that may change; the design parameter may be among them.
     at
         Value of the design parameter, within the isola's range; by default that of the system.
     scales
@@ -116,7 +116,7 @@ def design_margin(
     if not (is_number(here) and here in isola):
         low, high = isola.range
         raise InputError(f"no isola at {isola.parameter} = {here}: it exists from {low:.6g} to {high:.6g}; give at=")
-    surface = _Surface.of(isola, parameters, float(here), scales)
+    surface = _Surface.of(isola, by, float(here), scales)
     y, linear = np.zeros(len(surface.names)), 0.0
     item: TrackedEvent = start
     for number in range(_ITERATIONS):
@@ -158,7 +158,7 @@ class _Surface:
         known = list(isola.system.parameters)
         names = tuple(dict.fromkeys([parameters] if isinstance(parameters, str) else parameters))
         if not names:
-            raise InputError("parameters is empty: name those that may change")
+            raise InputError("by is empty: name the parameters that may change")
         for name in (*names, *(scales or {})):
             if name not in known:
                 raise InputError(f"the system has no parameter {name!r}{suggest(str(name), known)}")
@@ -177,7 +177,7 @@ class _Surface:
     def at(self, item: TrackedEvent, y: np.ndarray) -> tuple[float, np.ndarray]:
         """How far the end lies from the design, in the design parameter, and its derivatives by y."""
         others = [name for name in self.names if name != self.q]
-        known = sensitivity(item, others) if others else {}
+        known = sensitivity(item, by=others) if others else {}
         slope = np.array([-1.0 if name == self.q else known[name][self.q] for name in self.names])
         return item.parameter(self.q) - self._values(y).get(self.q, self.here), slope * self.sizes
 

@@ -164,9 +164,9 @@ class RegimeMap(PlaneMap):
     @limited
     def check(
         self,
+        *,
         points: Count = 200,
         seed: Index = 0,
-        *,
         states: Count = 4,
         transient: Index = 400,
         progress: Progress = None,
@@ -394,7 +394,7 @@ class RegimeCheck:
                 continue
             system = self.system.with_parameters({self.name: one.value})
             with suppress(ConvergenceError):
-                orbits.append(periodic_orbit(system, one.omega, one.state, one.period))
+                orbits.append(periodic_orbit(system, one.omega, state=one.state, subharmonic=one.period))
         return orbits
 
     @property

@@ -73,8 +73,8 @@ def regime_map(
     omega: tuple[float, float],
     parameter: str,
     bounds: tuple[float, float],
-    harmonics: Harmonics = "adaptive",
     *,
+    harmonics: Harmonics = "adaptive",
     depth: int = 2,
     values: int = 5,
     resolution: float = 1e-4,
@@ -412,7 +412,7 @@ def _follow_curves_beside(value: float, catalogue: Catalogue) -> None:
     low, high = catalogue.omega
     around = catalogue.omega.around
     with catalogue.noting(f"at {catalogue.name} = {value:.6g} the response beside the range of omega was not found"):
-        wide = frequency_response(catalogue.at(value), around[::-1], catalogue.harmonics, **catalogue.options)
+        wide = frequency_response(catalogue.at(value), around[::-1], harmonics=catalogue.harmonics, **catalogue.options)
         pass_on(wide.interruption)
         folds: list[Bifurcation] = wide.bifurcations["LP"]
         places = [float(wide.omega[0]), *(b.omega for b in folds), float(wide.omega[-1])]

@@ -55,17 +55,18 @@ class DerivativeReport:
 @checked
 def check_derivatives(
     element: BaseElement,
+    *,
     parameters: Mapping[str, float] | None = None,
     u: ArrayLike | None = None,
     v: ArrayLike | None = None,
-    rtol: Positive = 1e-6,
+    tolerance: Positive = 1e-6,
 ) -> DerivativeReport:
     """Compare every derivative that an element provides with central differences of fourth order.
 
     `u`, `v` (N,): where to look (default: around the gaps or sharp points, on both sides of each). Those closer to
     a corner of a piecewise-linear law than the step are left out. `parameters` gives the element's expressions their
-    numbers. Errors are relative to the largest value that the derivative takes there; `rtol` bounds them. Of a coupled
-    element, u and v are (m, N), one row per input.
+    numbers. Errors are relative to the largest value that the derivative takes there; `tolerance` bounds them. Of a
+    coupled element, u and v are (m, N), one row per input.
     """
     if not isinstance(element, BaseElement):
         raise InputError(f"the first argument must be an element such as CubicSpring(..), not {shortened(element)}")
@@ -76,7 +77,7 @@ def check_derivatives(
     at = _places(element, c, u, v)
     messages = _wrong_shapes(element, at, c)
     errors = {} if messages else {**_derivative_errors(element, at, c), **_smoothness_errors(element, at, c)}
-    return DerivativeReport(repr(element), rtol, errors, tuple(messages))
+    return DerivativeReport(repr(element), tolerance, errors, tuple(messages))
 
 
 @dataclass(frozen=True)

@@ -154,7 +154,7 @@ class Verify(BranchStep, kind="verify"):
         points = [] if self.what == "bifurcations" else range(0, len(branch), self.every)
         bifurcations = self.what != "points"
         asked: dict[str, Any] = {"points": points, "bifurcations": bifurcations, "progress": context.progress}
-        whole = verify(branch, self.tolerance, **asked)
+        whole = verify(branch, tolerance=self.tolerance, **asked)
         rows = [_row(f"point {p.index}", p.omega, p, p.multiplier_error, p.stable, p.outcome) for p in whole.points]
         rows += [_row(b.kind, b.omega, b) for b in whole.bifurcations]
         names = ("what", "omega", "distance", "multiplier_error", "stable", "agrees", "outcome", "reason")
@@ -204,7 +204,7 @@ class Stability(BranchStep, kind="stability"):
         rows, multipliers, errors = [], [], []
         for name, motion in motions:
             for method in self.methods or [None]:
-                verdict = stability(motion.orbit, None if method is None else as_stability(method))
+                verdict = stability(motion.orbit, method=None if method is None else as_stability(method))
                 rows.append((name, motion.orbit.omega, verdict.method, verdict.stable, verdict.decided, verdict.note))
                 multipliers.append(verdict.multipliers)
                 errors.append(verdict.errors)

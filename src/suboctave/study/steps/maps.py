@@ -161,7 +161,7 @@ class Regimes(DesignStep, kind="regime_map", verb=regime_map, besides=("check_po
         regimes: RegimeMap = self.computed(context)
         if not self.check_points or regimes.interrupted:
             return _table_of(regimes)
-        checked = regimes.check(self.check_points, self.seed, progress=context.progress)
+        checked = regimes.check(points=self.check_points, seed=self.seed, progress=context.progress)
         return _table_of(regimes, f"{100.0 * checked.rate:.1f} % of {len(checked.landings)} trajectories in time agree")
 
 
@@ -202,7 +202,7 @@ class Sensitivities(_ByParameters, kind="sensitivity"):
             yield ("start", "bifurcation"), f"sensitivities are of {', '.join(known)}"
 
     def run(self, context: Context) -> Table:
-        found = sensitivity(self.start.chosen(context.results), self.by)
+        found = sensitivity(self.start.chosen(context.results), by=self.by)
         columns = found.to_dataframe().reset_index()
         where = ", ".join(f"{name} = {value:.7g}" for name, value in found.position.items())
         title = f"{self.start.words}: {found.kind} at {where}"
@@ -230,7 +230,7 @@ class Margin(_ByParameters, kind="design_margin"):
         isolas = context.results.get(self.isola.analysis)
         if not isinstance(isolas, Isolas):
             raise InputError(f"the analysis {self.isola.analysis!r} gave no isolas")
-        found = design_margin(self.isola.isola_of(isolas), self.by, at=self.at, scales=self.scales, end=self.end)
+        found = design_margin(self.isola.isola_of(isolas), by=self.by, at=self.at, scales=self.scales, end=self.end)
         rows = [(name, found.design[name], found.values[name], found.scaled[name]) for name in found.values]
         title = f"{self.isola.words}: design margin {found.distance:.6g} ({found.linear:.6g} to first order)"
         return Table.of_rows(("parameter", "design", "gone_at", "change_in_scales"), rows, title)
