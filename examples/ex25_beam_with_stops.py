@@ -21,7 +21,7 @@ beam = so.structures.beam(
     length=0.7, width=0.014, height=0.014, young=2.05e11, density=7800.0, elements=ELEMENTS, supports="clamped-free"
 )
 print(beam)
-modes = beam.frequencies(3)
+modes = beam.natural_frequencies(3)
 print(modes)
 
 first, second, _ = modes.omega

@@ -81,7 +81,7 @@ def test_a_shape_is_drawn_where_its_nodes_are():
 
 
 def test_the_largest_displacement_is_drawn_at_a_share_of_the_extent(cantilever):
-    field = 1e-6 * cantilever.frequencies(1).modes[:, 0]
+    field = 1e-6 * cantilever.natural_frequencies(1).modes[:, 0]
     figure = so.plot_shape(cantilever, field)
     line = figure.axes[0].collections[-1]
     ends = np.array(line._segments3d).reshape(-1, 3)
@@ -89,7 +89,7 @@ def test_the_largest_displacement_is_drawn_at_a_share_of_the_extent(cantilever):
 
 
 def test_signs_have_colours_where_all_moves_along_one_axis(cantilever):
-    mode = cantilever.frequencies(2).modes[:, 1]
+    mode = cantilever.natural_frequencies(2).modes[:, 1]
     assert so.plot_shape(cantilever, mode).axes[-1].get_ylim()[0] < 0.0
     both = square_plate()
     field = both.direction({(8, "z"): -2.0, (4, "x"): 1.5})
@@ -97,7 +97,7 @@ def test_signs_have_colours_where_all_moves_along_one_axis(cantilever):
 
 
 def test_a_shape_is_saved_and_the_same_twice(cantilever, tmp_path):
-    mode = cantilever.frequencies(1).modes[:, 0]
+    mode = cantilever.natural_frequencies(1).modes[:, 0]
     for name in ("a.png", "b.png"):
         so.plot_shape(cantilever, mode, tmp_path / name, size="single-column")
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
@@ -125,7 +125,7 @@ def test_a_motion_is_a_gif_that_lasts_as_long_as_it_should(cantilever, tmp_path)
 def test_fields_go_to_pyvista_and_vtu(cantilever, tmp_path):
     pytest.importorskip("pyvista")
     meshio = pytest.importorskip("meshio")
-    modes = cantilever.frequencies(2).modes
+    modes = cantilever.natural_frequencies(2).modes
     fields = {"first": modes[:, 0], "second": modes[:, 1]}
     grid = so.to_pyvista(cantilever, fields)
     assert (grid.n_points, grid.n_cells) == (11, 10)

@@ -39,7 +39,7 @@ def chain(springs):
 def test_a_dof_with_neither_mass_nor_stiffness_is_left_out(place):
     where = [i for i in range(4) if i != place]
     dofs = [(node, "x") for node in range(4)]
-    found = so.Structure(placed(np.eye(3), 4, where), placed(FREE, 4, where), dofs=dofs).frequencies()
+    found = so.Structure(placed(np.eye(3), 4, where), placed(FREE, 4, where), dofs=dofs).natural_frequencies()
     assert_allclose(found.omega, [0.0, 1.0, np.sqrt(3.0)], atol=1e-14)
     assert (found.rigid, found.left_out) == (1, (place,))
     assert f"left out, as they move with neither mass nor stiffness: {place} x" in str(found)
@@ -49,7 +49,7 @@ def test_a_dof_with_neither_mass_nor_stiffness_is_left_out(place):
 def test_so_are_motions_of_several_such_dofs():
     """Two, and three, massless DOFs that springs join to each other and to nothing else: one each may be held."""
     stiffness = scipy.linalg.block_diag(FREE, chain([2.0]), 7.0 * FREE)
-    found = so.Structure(np.diag([1.0, 1, 1, 0, 0, 0, 0, 0]), stiffness).frequencies()
+    found = so.Structure(np.diag([1.0, 1, 1, 0, 0, 0, 0, 0]), stiffness).natural_frequencies()
     assert_allclose(found.omega, [0.0, 1.0, np.sqrt(3.0)], atol=1e-14)
     assert len(found.left_out) == 2
     assert found.left_out[0] in (3, 4)
@@ -57,7 +57,7 @@ def test_so_are_motions_of_several_such_dofs():
 
 
 def test_mass_without_stiffness_is_a_rigid_body():
-    found = so.Structure(np.eye(4), placed(FREE, 4, [0, 2, 3])).frequencies()
+    found = so.Structure(np.eye(4), placed(FREE, 4, [0, 2, 3])).natural_frequencies()
     assert_allclose(found.omega, [0.0, 0.0, 1.0, np.sqrt(3.0)], atol=1e-14)
     assert (found.rigid, found.left_out) == (2, ())
 
@@ -73,7 +73,7 @@ def test_stiffness_without_mass_is_condensed(unit):
     condensed = stiffness[np.ix_(own, own)] - stiffness[np.ix_(own, rest)] @ np.linalg.solve(
         inner, stiffness[np.ix_(rest, own)]
     )
-    found = so.Structure(np.diag(mass), stiffness).frequencies()
+    found = so.Structure(np.diag(mass), stiffness).natural_frequencies()
     assert_allclose(found.omega[1:] ** 2, scipy.linalg.eigvalsh(condensed)[1:], rtol=1e-7)
     assert (found.rigid, found.omega[0]) == (1, 0.0)
     assert_allclose(stiffness @ found.modes, mass[:, None] * found.modes * found.omega**2, atol=1e-9 * stiffness.max())
@@ -81,7 +81,7 @@ def test_stiffness_without_mass_is_condensed(unit):
 
 def test_a_singular_mass_without_a_zero_on_its_diagonal():
     """Both DOFs move alike where there is inertia: springs 1 and 3 in a row."""
-    found = so.Structure(np.ones((2, 2)), np.diag([1.0, 3.0])).frequencies()
+    found = so.Structure(np.ones((2, 2)), np.diag([1.0, 3.0])).natural_frequencies()
     assert_allclose(found.omega, [np.sqrt(3.0 / 4.0)], rtol=1e-13)
 
 
@@ -90,10 +90,10 @@ def test_large_ones_leave_them_out_too(elements):
     structure = beam(1.0, **STEEL, elements=elements, supports="free-free")
     n, gone = structure.n + 3, [0, 51, structure.n + 2]
     into = scipy.sparse.csr_array(np.eye(n)[:, np.setdiff1d(np.arange(n), gone)])
-    found = so.Structure(into @ structure.mass @ into.T, into @ structure.stiffness @ into.T).frequencies(5)
+    found = so.Structure(into @ structure.mass @ into.T, into @ structure.stiffness @ into.T).natural_frequencies(5)
     assert found.left_out == tuple(gone)
     assert found.rigid == 2
-    assert_allclose(found.omega[2:], structure.frequencies(5).omega[2:], rtol=1e-8)
+    assert_allclose(found.omega[2:], structure.natural_frequencies(5).omega[2:], rtol=1e-8)
 
 
 # ---------------------------------------------------------------------------------------------- soft modes, rigid ones
@@ -103,7 +103,7 @@ def test_the_lowest_modes_of_fine_meshes_are_no_rigid_bodies(elements, young):
     """Against the closed form; with free ends two are."""
     unit = np.sqrt(young * 0.01**2 / 12.0 / 7800.0)
     for supports, roots, rigid in (("clamped-free", CLAMPED, 0), ("free-free", LOOSE, 2)):
-        found = beam(1.0, **{**STEEL, "young": young}, elements=elements, supports=supports).frequencies(4)
+        found = beam(1.0, **{**STEEL, "young": young}, elements=elements, supports=supports).natural_frequencies(4)
         assert found.rigid == rigid
         assert_allclose(found.omega[rigid : rigid + 2], unit * np.square(roots), rtol=2e-5)
 
@@ -114,7 +114,7 @@ def test_each_mode_keeps_half_the_loss_factor(elements, supports):
     """A loss factor of 0.02 damps every mode by 0.01, and no rigid body."""
     structure = beam(1.0, **STEEL, elements=elements, supports=supports)
     system = structure.system(loads=[so.HarmonicLoad(0, 1.0)], structural=0.02)
-    damping, found = system.viscous_equivalent().matrices()[1], structure.frequencies(6)
+    damping, found = system.viscous_equivalent().matrices()[1], structure.natural_frequencies(6)
     rates = np.einsum("ij,ij->j", found.modes, damping @ found.modes)
     assert_allclose(rates, 2.0 * 0.01 * found.omega, rtol=1e-5, atol=1e-6 * rates[-1])
 
@@ -126,7 +126,7 @@ def test_the_linear_part_says_the_frequencies_of_the_structure(elements):
         structure = beam(1.0, **STEEL, elements=elements, supports=supports)
         tip = structure.dof(elements, "z")
         system = structure.system([so.CubicSpring(tip, 1.0)], [so.HarmonicLoad(tip, 1.0)])
-        omega = structure.frequencies(4).omega
+        omega = structure.natural_frequencies(4).omega
         found = so.condense(system, 1.1 * omega[-1]).frequencies[:4]
         assert_allclose(found, omega, rtol=2e-5)
         assert np.count_nonzero(found == 0.0) == rigid
@@ -139,10 +139,10 @@ def test_springs_ten_decades_apart(unit):
     rods = scipy.linalg.eigh(unit * (chain([1.0, 2.0]) + np.diag([1.0, 0.0, 0.0])), np.diag([2.0, 3.0, 1.0]))[0]
     stiffness = chain(springs)
     stiffness[0, 0] += unit
-    held = so.Structure(np.eye(6), stiffness).frequencies()
+    held = so.Structure(np.eye(6), stiffness).natural_frequencies()
     assert held.rigid == 0
     assert_allclose(held.omega[:3] ** 2, rods, rtol=2e-5)
-    assert so.Structure(np.eye(6), chain(springs)).frequencies().rigid == 1
+    assert so.Structure(np.eye(6), chain(springs)).natural_frequencies().rigid == 1
 
 
 def test_a_soft_support_beside_stiff_springs_is_damped():

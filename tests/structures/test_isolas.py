@@ -30,7 +30,7 @@ def chain(n=10):
 def beam(elements=100):
     """As the chain, a cantilever of Hermite elements."""
     density = 1.0 / (0.25 * 0.02**2)
-    young = density / so.structures.beam(1.0, 0.02, 0.02, 1.0, 1.0, elements).frequencies(1).omega[0] ** 2
+    young = density / so.structures.beam(1.0, 0.02, 0.02, 1.0, 1.0, elements).natural_frequencies(1).omega[0] ** 2
     structure = so.structures.beam(1.0, 0.02, 0.02, young, density, elements)
     damping = so.Rayleigh(alpha=0.02, beta=0.04)
     return between_stops(lambda *parts: structure.system(*parts, damping), structure.dof(elements, "z"), 2.0, 0.8)

@@ -28,7 +28,7 @@ def test_matrices_from_files(tmp_path, monkeypatch, capsys):
     (printed,) = blocks("text")
     assert capsys.readouterr().out == printed
     squares = scipy.linalg.eigvalsh(scope["springs"].toarray(), scope["masses"].toarray())
-    np.testing.assert_allclose(scope["frame"].frequencies().omega, np.sqrt(squares))
+    np.testing.assert_allclose(scope["frame"].natural_frequencies().omega, np.sqrt(squares))
     exec(compile(system, "docs/structures.md", "exec"), scope)
     curve = scope["curve"]
     np.testing.assert_allclose(np.sort(curve.omega)[[0, -1]], [3.0, 6.0])

@@ -26,7 +26,7 @@ def test_cantilever_stiffens_as_its_normal_form_says():
     """Weakly nonlinear, one mode: the shift of the resonance is 3 knl phi^4 a^2 / (8 omega) at the modal amplitude a
     (Nayfeh & Mook, Nonlinear Oscillations, 1979, section 4.1), here seen as the phase at the linear resonance."""
     structure = beam(0.7, 0.014, 0.014, 2.05e11, 7800.0, 3)
-    found = structure.frequencies(1)
+    found = structure.natural_frequencies(1)
     omega, phi = found.omega[0], found.modes[structure.dof(3, "z"), 0]
     system = cantilever_beam(elements=3, F=0.02)
     curve = so.frequency_response(system, (0.98 * omega, 1.02 * omega), observe=structure.dof(3, "z"))
@@ -44,7 +44,7 @@ def test_clearance_plate(stops, places):
     assert system.n == structure.n == 1040
     mass, damping, stiffness = system.matrices()
     assert_allclose(damping, 0.02 * mass + 0.002 * stiffness, atol=1e-12 * np.abs(stiffness).max())
-    assert_allclose(structure.frequencies(1).omega, 1.0, rtol=1e-6)
+    assert_allclose(structure.natural_frequencies(1).omega, 1.0, rtol=1e-6)
     labels = [structure.dofs.labels[int(np.argmax(element.direction(system.n)))] for element in system.elements]
     at = np.array([structure.mesh.points[node] for node, _ in labels])
     assert_allclose(at[:, :2], [[1.0, y] for y in places], atol=1e-12)

@@ -23,7 +23,7 @@ CLOSED_FORMS = {
 def roots(supports, elements):
     """`(omega^2 rho A L^4 / E I)^(1/4)` of the elastic modes."""
     length, width, height = 0.7, 0.02, 0.014
-    found = beam(length, width, height, **STEEL, elements=elements, supports=supports).frequencies(6)
+    found = beam(length, width, height, **STEEL, elements=elements, supports=supports).natural_frequencies(6)
     unit = np.sqrt(STEEL["young"] * height**2 / 12.0 / STEEL["density"]) / length**2
     return np.sqrt(found.omega[found.rigid :][:3] / unit)
 
@@ -53,7 +53,7 @@ def test_free_structures_move_as_rigid_bodies():
     for motion, inertia in ((lift, 0.2), (turn, 0.2 * 2.0**2 / 3.0)):
         assert np.abs(free.stiffness @ motion).max() < 1e-13 * abs(free.stiffness).max()
         assert_allclose(motion @ free.mass @ motion, inertia, rtol=1e-13)
-    assert free.frequencies(4).rigid == 2
+    assert free.natural_frequencies(4).rigid == 2
 
 
 def test_free_plate_moves_as_a_rigid_body():
@@ -70,12 +70,12 @@ def test_free_plate_moves_as_a_rigid_body():
         motion = np.array([motion_at(node).get(what, 0.0) for node, what in free.dofs.labels])
         assert np.abs(free.stiffness @ motion).max() < 1e-12 * abs(free.stiffness).max()
         assert_allclose(motion @ free.mass @ motion, inertia, rtol=1e-12)
-    assert free.frequencies(5).rigid == 3
+    assert free.natural_frequencies(5).rigid == 3
 
 
 def flexural(structure, count, poisson=0.3):
     """`omega a^2 sqrt(rho h / D)` of a unit square with unit modulus and density, 0.01 thick."""
-    return structure.frequencies(count).omega / np.sqrt(0.01**2 / 12.0 / (1.0 - poisson**2))
+    return structure.natural_frequencies(count).omega / np.sqrt(0.01**2 / 12.0 / (1.0 - poisson**2))
 
 
 def test_plate_frequencies_are_those_published():
@@ -162,8 +162,8 @@ def test_solids_of_scikit_fem_have_nodes_and_directions():
 def test_two_beams_joined_are_each_as_before():
     upper, lower = (beam(1.0, 0.02, h, **STEEL, elements=6, name=n) for h, n in ((0.01, "upper"), (0.02, "lower")))
     both = join(upper, lower, places=[[0.0, 0.0, 0.0], [0.5, 0.0, -0.1]])
-    alone = np.sort(np.concatenate([upper.frequencies(3).omega, lower.frequencies(3).omega]))
-    assert_allclose(both.frequencies(4).omega, alone[:4], rtol=1e-8)
+    alone = np.sort(np.concatenate([upper.natural_frequencies(3).omega, lower.natural_frequencies(3).omega]))
+    assert_allclose(both.natural_frequencies(4).omega, alone[:4], rtol=1e-8)
     assert both.dof("lower:6 z") == upper.n + lower.dof(6, "z")
     assert both.mesh.nearest(1.5, 0.0, -0.1) == "lower:6"
     damped = join(upper.with_damping(so.Rayleigh(1.0)), lower)
@@ -212,4 +212,4 @@ def test_a_hundred_thousand_degrees_of_freedom():
     for _ in range(30):  # inverse iteration
         shape = solved.solve(large.mass @ (shape / np.abs(shape).max()))
     square = shape @ (large.stiffness @ shape) / (shape @ (large.mass @ shape))
-    assert_allclose(np.sqrt(square), small.frequencies(1).omega[0], rtol=2e-4)
+    assert_allclose(np.sqrt(square), small.natural_frequencies(1).omega[0], rtol=2e-4)

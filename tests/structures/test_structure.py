@@ -146,7 +146,7 @@ def test_without_labels_dofs_are_numbers(chain):
 
 # ------------------------------------------------------------------------------------------------- natural frequencies
 def test_frequencies_of_a_chain(structure, chain):
-    found = structure.frequencies(20)
+    found = structure.natural_frequencies(20)
     np.testing.assert_allclose(found.omega, chain.omega, rtol=1e-13)
     np.testing.assert_allclose(found.hertz, chain.omega / (2 * np.pi), rtol=1e-13)
     assert "rad per unit time" in str(found)
@@ -158,7 +158,7 @@ def test_frequencies_of_a_chain(structure, chain):
 @pytest.mark.parametrize("elements", [40, 400])
 def test_a_free_beam_has_two_rigid_body_modes(elements):
     """Densely and by Lanczos's method; (beta l)^2 of the first elastic ones from cos(beta) cosh(beta) = 1."""
-    found = beam(elements).frequencies(5)
+    found = beam(elements).natural_frequencies(5)
     assert found.rigid == 2
     assert "2 rigid-body modes" in str(found)
     expected = np.array([4.730040744862704, 7.853204624095838, 10.99560783800167]) ** 2
@@ -169,8 +169,9 @@ def test_a_free_beam_has_two_rigid_body_modes(elements):
 def test_units_do_not_matter():
     one = beam(200)
     other = so.Structure(one.mass * 1e-9, one.stiffness * 1e6)
-    np.testing.assert_allclose(other.frequencies(6).omega[2:], one.frequencies(6).omega[2:] * 10**7.5, rtol=1e-6)
-    assert other.frequencies(6).rigid == 2
+    found = other.natural_frequencies(6)
+    np.testing.assert_allclose(found.omega[2:], one.natural_frequencies(6).omega[2:] * 10**7.5, rtol=1e-6)
+    assert found.rigid == 2
 
 
 def test_massless_dofs_are_said_and_do_not_spoil_frequencies(chain):
@@ -184,7 +185,7 @@ def test_massless_dofs_are_said_and_do_not_spoil_frequencies(chain):
     k = chain.stiffness
     condensed = k[np.ix_(keep, keep)] - np.outer(k[keep, 3], k[3, keep]) / k[3, 3]
     exact = np.sqrt(scipy.linalg.eigvalsh(condensed))
-    np.testing.assert_allclose(structure.frequencies(9).omega, exact, rtol=1e-12)
+    np.testing.assert_allclose(structure.natural_frequencies(9).omega, exact, rtol=1e-12)
     with pytest.raises(so.InputError, match=r"DOFs without inertia: 7 z; .* structure.fixed"):
         structure.system()
 
@@ -196,37 +197,37 @@ def test_constraints_by_multipliers_hold_what_they_constrain(chain):
     stiffness[8, 0] = stiffness[0, 8] = 1.0
     bound = so.Structure(mass, stiffness)
     held = so.Structure(chain.mass, chain.stiffness).fixed([0])
-    np.testing.assert_allclose(bound.frequencies(7).omega, held.frequencies(7).omega, rtol=1e-9)
+    np.testing.assert_allclose(bound.natural_frequencies(7).omega, held.natural_frequencies(7).omega, rtol=1e-9)
 
 
 def test_a_buckled_structure_is_said():
     structure = so.Structure(np.eye(3), np.diag([-4.0, 1.0, 9.0]))
-    found = structure.frequencies()
+    found = structure.natural_frequencies()
     np.testing.assert_allclose(found.omega, [-2.0, 1.0, 3.0])
     assert "at rest is unstable" in str(found)
 
 
 def test_frequencies_that_lie_too_close_are_no_endless_search(monkeypatch):
     """Masses on a stiff bed, hardly joined: the lowest of 20000 frequencies differ by 1e-11 of themselves."""
-    monkeypatch.setattr("suboctave.structures.frequencies._RESTARTS", 2)
+    monkeypatch.setattr("suboctave.model.frequencies._RESTARTS", 2)
     n = 20000
     joined = scipy.sparse.diags_array([-np.ones(n - 1), 2 * np.ones(n), -np.ones(n - 1)], offsets=[-1, 0, 1])
     structure = so.Structure(scipy.sparse.eye_array(n), 1e3 * scipy.sparse.eye_array(n) + 1e-3 * joined)
     with pytest.raises(so.ConvergenceError, match="may lie too close") as caught:
-        structure.frequencies(3)
+        structure.natural_frequencies(3)
     assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("count", [0, -1, 1.5, "a", True])
 def test_a_count_of_frequencies_is_a_whole_number(structure, count):
     with pytest.raises(so.InputError, match="whole number"):
-        structure.frequencies(count)
+        structure.natural_frequencies(count)
 
 
 # -------------------------------------------------------------------------------------------------------------- damping
 def test_rayleigh_from_ratios_has_these_ratios(structure, chain):
     damping = so.Rayleigh.from_ratios((chain.omega[0], 0.01), (chain.omega[4], 0.02))
-    found = structure.frequencies(8)
+    found = structure.natural_frequencies(8)
     c = damping.matrix(structure.mass, structure.stiffness)
     ratios = np.diag(found.modes.T @ c @ found.modes) / (2 * found.omega)
     np.testing.assert_allclose(ratios[[0, 4]], [0.01, 0.02], rtol=1e-10)
@@ -302,7 +303,7 @@ def test_structural_damping_of_several_structures_in_one(structure):
     "damping", [so.ModalDamping(0.02), so.ModalDamping([0.02, 0.02]), so.ModalDamping(0.02, count=2)]
 )
 def test_modal_damping_damps_modes(structure, damping):
-    found = structure.frequencies(8)
+    found = structure.natural_frequencies(8)
     c = structure.with_damping(damping).system().matrices()[1]
     ratios = np.diag(found.modes.T @ c @ found.modes) / (2 * found.omega)
     np.testing.assert_allclose(ratios[:2], 0.02)
@@ -311,7 +312,7 @@ def test_modal_damping_damps_modes(structure, damping):
 
 
 def test_modes_beyond_a_ratio_of_zero_are_undamped(structure):
-    found = structure.frequencies(8)
+    found = structure.natural_frequencies(8)
     c = structure.with_damping(so.ModalDamping([0.02, 0.01, 0.0])).system().matrices()[1]
     ratios = np.diag(found.modes.T @ c @ found.modes) / (2 * found.omega)
     np.testing.assert_allclose(ratios, [0.02, 0.01, *np.zeros(6)], atol=1e-14)
@@ -321,9 +322,9 @@ def test_what_grows_is_not_fed(structure):
     """A buckled structure: modes beyond those that grow are damped, these not."""
     n = structure.n
     buckled = so.Structure(
-        structure.mass, structure.stiffness - 2.0 * structure.frequencies(2).omega[0] ** 2 * structure.mass
+        structure.mass, structure.stiffness - 2.0 * structure.natural_frequencies(2).omega[0] ** 2 * structure.mass
     )
-    found = buckled.frequencies(6)
+    found = buckled.natural_frequencies(6)
     assert found.growing >= 1
     c = buckled.with_damping(so.ModalDamping(0.02, count=4)).system().matrices()[1]
     rates = np.diag(found.modes.T @ c @ found.modes)
@@ -366,7 +367,7 @@ def test_frequencies_of_many_degrees_of_freedom(lowest):
     )
     structure = so.Structure(scipy.sparse.eye_array(n).tocsr(), stiffness.tocsr())
     squares = (2.0 * n / np.pi * np.sin(0.5 * np.pi * np.arange(1, n + 1) / (n + 1))) ** 2 - lowest
-    found = structure.frequencies(8)
+    found = structure.natural_frequencies(8)
     wanted = np.sign(squares) * np.sqrt(np.abs(squares))
     np.testing.assert_allclose(found.omega, np.sort(wanted[:8]), rtol=1e-7)
     assert found.growing == (squares < 0.0).sum()
@@ -392,7 +393,7 @@ def test_modal_damping_of_a_large_structure():
     """The update that is never written out, against the full matrix."""
     structure, system = rod(2500, so.ModalDamping(0.01, count=30))
     assert isinstance(system.damping.sparse_value({}), Updated)
-    found = structure.frequencies(40)
+    found = structure.natural_frequencies(40)
     ratios = np.einsum("im,im->m", found.modes, system.damping.sparse_value({}) @ found.modes) / (2.0 * found.omega)
     np.testing.assert_allclose(ratios[:30], 0.01, rtol=1e-6)
     np.testing.assert_allclose(ratios[30:], 0.01 * found.omega[30:] / found.omega[29], rtol=1e-6)

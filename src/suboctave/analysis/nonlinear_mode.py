@@ -26,13 +26,13 @@ from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.energy import at_rest, damping_ratio
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.linear_modes import linear_modes
+from suboctave.model.frequencies import natural_frequencies
 from suboctave.model.inputs import check_count, check_is_system, check_range, timed
 from suboctave.model.system import System
 from suboctave.model.updated import largest_entry
 from suboctave.options import with_options
 from suboctave.progress import reporting
 from suboctave.results.modes import ModeCurve
-from suboctave.structures.frequencies import natural_frequencies
 
 #: share by which forces deviate from linear ones where a mode begins
 _LINEAR = 1e-4

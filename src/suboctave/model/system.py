@@ -10,7 +10,7 @@ import keyword
 import unicodedata
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from types import MappingProxyType
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,6 +27,9 @@ from suboctave.model.loads import HarmonicLoad, Load, LoadComponent
 from suboctave.model.matrices import MatrixCoefficient, check_damping, check_mass, matrix_coefficient, viscous_damping
 from suboctave.model.modes import modes_of
 from suboctave.units import UnitSystem
+
+if TYPE_CHECKING:
+    from suboctave.model.frequencies import NaturalFrequencies
 
 AnElement = Annotated[BaseElement, Rule("an Element", lambda element: True)]
 ALoad = Annotated[Load, Rule("a load", lambda load: True)]
@@ -312,6 +315,10 @@ class System:
         zeros = {name: self.mass.zeros(name) for name in ("damping", "structural")}
         return self._changed(**zeros)._pruned()
 
+    def linear(self) -> System:
+        """The same system without its elements, and without the parameters of these alone."""
+        return self._changed(elements=())._pruned()
+
     def fed(self, rate: str) -> System:
         """The same system with the damping `C - rate M`, rate a new parameter, zero to begin with."""
         return self._changed(damping=self.damping.less(rate, self.mass), parameters={**self.parameters, rate: 0.0})
@@ -343,6 +350,20 @@ class System:
         at = self.parameters if values is None else values
         mass, damping, stiffness = (None if matrix is None else matrix.value(at) for matrix in matrices)
         return mass, damping, stiffness
+
+    def natural_frequencies(
+        self, count: int = 10, *, about: Any = None, parameters: Mapping[str, float] | None = None, **more: float
+    ) -> NaturalFrequencies:
+        """Natural frequencies, damping ratios and mode shapes of small vibrations, the lowest `count`; print it.
+
+        Elements have their slopes at rest, or at the displacements `about` (n,); `system.linear()` has none. Values of
+        parameters that are given, `parameters={"k": 2.0}` or `k=2.0`, stand in for those of the system.
+        """
+        from suboctave.model.linearised import small_vibrations
+
+        changed = self.read_values(parameters) | self.read_values(more)
+        system = self.with_parameters(changed) if changed else self
+        return small_vibrations(system, count, about, system.parameters)
 
     # ------------------------------------------------------------------------------------------------------ loads
     def load_components(self) -> tuple[LoadComponent, ...]:

@@ -21,9 +21,9 @@ import numpy as np
 from suboctave.arguments import checked
 from suboctave.errors import InputError, is_number, shortened
 from suboctave.model.expressions.coefficients import Coefficient, Number, named_coefficient
+from suboctave.model.frequencies import natural_frequencies
 from suboctave.model.inputs import check_count
 from suboctave.model.updated import Updated
-from suboctave.structures.frequencies import natural_frequencies
 
 #: DOFs up to which all modes are damped, by a full matrix: 32 MB of it
 MOST_MODAL = 2000

@@ -73,7 +73,7 @@ def clearance_plate_structure(nx: int = 20, ny: int = 12) -> Structure:
     thickness = 0.01
     density = 1.0 / (_LENGTH * _WIDTH * thickness)
     # of one mesh for all: finer ones are the same plate
-    (omega,) = plate(_LENGTH, _WIDTH, thickness, 1.0, 0.3, density, (20, 12)).frequencies(1).omega
+    (omega,) = plate(_LENGTH, _WIDTH, thickness, 1.0, 0.3, density, (20, 12)).natural_frequencies(1).omega
     return plate(_LENGTH, _WIDTH, thickness, 1.0 / omega**2, 0.3, density, (nx, ny), name="clearance plate")
 
 

@@ -14,13 +14,13 @@ from suboctave.arguments import Matrix, Rule, Title, array_like, checked
 from suboctave.errors import InputError, located, path_of, printable, shortened
 from suboctave.model.elements.base import Array, BaseElement
 from suboctave.model.expressions.coefficients import Coefficient, named_coefficient
+from suboctave.model.frequencies import NaturalFrequencies, natural_frequencies
 from suboctave.model.loads import Load
 from suboctave.model.system import System
 from suboctave.model.updated import part_of
 from suboctave.structures.checks import inertia_checked, square_matrix, symmetric_matrix
 from suboctave.structures.damping import ModalDamping, Rayleigh, written_out
 from suboctave.structures.dof_map import DofMap, shown_dofs, weighted
-from suboctave.structures.frequencies import NaturalFrequencies, natural_frequencies
 from suboctave.structures.mesh import Mesh
 from suboctave.structures.numpy_files import write
 
@@ -49,8 +49,9 @@ class Structure:
     mesh
         For pictures.
 
-    Units are the user's own, if they are consistent (N, mm, t, s; or N, m, kg, s): `frequencies` shows whether they
-    are. Raises `InputError` for matrices that are no such, of other sizes, asymmetric, and for maps of another length.
+    Units are the user's own, if they are consistent (N, mm, t, s; or N, m, kg, s): `natural_frequencies` shows whether
+    they are. Raises `InputError` for matrices that are no such, of other sizes, asymmetric, and for maps of another
+    length.
     """
 
     mass: Matrix
@@ -162,14 +163,24 @@ class Structure:
         """The structure with another damping: a matrix (n, n), `Rayleigh`, `ModalDamping`, or None."""
         return replace(self, damping=damping)
 
-    def frequencies(self, count: int = 10) -> NaturalFrequencies:
-        """The lowest `count` natural frequencies without damping, with their modes; rigid-body modes are counted.
+    def natural_frequencies(self, count: int = 10) -> NaturalFrequencies:
+        """The lowest `count` natural frequencies, with damping ratios and modes; rigid-body modes are counted.
 
         Printed, they are a table in radians per unit time and in hertz: frequencies 10^1.5 or 10^3 off show units that
         do not fit each other. Degrees of freedom without mass follow the others; those that have no stiffness either
-        are left out, and the table says which.
+        are left out, and the table says which. Damping with expressions in parameters needs their values, which a
+        `system` has.
         """
-        return natural_frequencies(self.mass, self.stiffness, count, self.dofs)
+        damping, losses, notes = self.damping, self.losses(), []
+        if isinstance(damping, ModalDamping | Rayleigh):
+            damping = damping.matrix(self.mass, self.stiffness)
+        if isinstance(damping, Mapping) or isinstance(losses, Mapping):
+            damping = losses = None
+            notes = ["without damping, which has parameters: system(...).natural_frequencies() has their values"]
+        names = () if self.dofs is None else self.dofs.names
+        return natural_frequencies(
+            self.mass, self.stiffness, count, names, damping=damping, structural=losses, notes=notes
+        )
 
     def system(
         self,
