@@ -64,9 +64,12 @@ def test_a_spring_that_softens_beyond_a_gap_is_a_text():
     assert isinstance(hardening.elements[0], so.ElasticStop)
 
 
-@pytest.mark.parametrize("power", [1001, 10**6, 10**400])
-def test_powers_that_no_number_can_hold_are_refused(power):
-    with pytest.raises(InputError, match=r"larger than 1000|a whole number of at most 18 digits"):
+@pytest.mark.parametrize(
+    ("power", "message"),
+    [(1001, "larger than 1000"), (10**6, "larger than 1000"), (10**400, "a whole number of at most 18 digits")],
+)
+def test_powers_that_no_number_can_hold_are_refused(power, message):
+    with pytest.raises(InputError, match=message):
         so.PolynomialSpring(0, {power: 1.0})
     so.PolynomialSpring(0, {1000: 1.0})
 

@@ -70,6 +70,9 @@ def test_components_that_no_motion_has_are_refused_with_the_nearest(loaded, trip
         plot([loaded, tripled], harmonic=0.333)
     with pytest.raises(InputError, match="period T, which has whole multiples"):
         loaded.to_dataframe(readings=["harmonic_0.5"])
-    for wrong in (-1, True, "half", float("inf"), "1/0", [1]):
-        with pytest.raises(InputError, match=r"no multiple of omega|must be a finite number or a text"):
+    for wrong in (-1, "half", "1/0"):
+        with pytest.raises(InputError, match="is no multiple of omega"):
+            plot(loaded, harmonic=wrong)
+    for wrong in (True, float("inf"), [1]):
+        with pytest.raises(InputError, match="harmonic must be a finite number or a text"):
             plot(loaded, harmonic=wrong)

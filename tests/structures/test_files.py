@@ -497,18 +497,29 @@ def test_matrices_of_calculix(tmp_path, chain):
         assert structure.name == "job"
 
 
-@pytest.mark.parametrize("suffix", [".sti", ".mas", ".dof"])
-def test_files_of_calculix_that_are_cut_off(suffix, tmp_path, chain):
+@pytest.mark.parametrize(
+    ("suffix", "cut", "missing"),
+    [
+        (
+            ".sti",
+            "job.sti has 5 rows, job.dof 8: one may be cut off",
+            "there is no file .*job.sti .did you mean 'job.mas'",
+        ),
+        (".mas", "job.mas has 4 rows, job.dof 8: one may be cut off", "job.sti: there is no job.mas beside it"),
+        (".dof", "job.sti: an entry stands in row or column 5; there are 4", "job.sti: there is no job.dof beside it"),
+    ],
+)
+def test_files_of_calculix_that_are_cut_off(suffix, cut, missing, tmp_path, chain):
     path = write_calculix(tmp_path, chain)
     lines = path.with_suffix(suffix).read_text().splitlines()
     path.with_suffix(suffix).write_text("\n".join(lines[: len(lines) // 2]) + "\n")
-    with pytest.raises(so.InputError, match=r"job\.(sti|mas)"):
+    with pytest.raises(so.InputError, match=cut):
         so.read_structure(path)
     path.with_suffix(suffix).write_text("\n".join(lines)[:-3])
     with pytest.raises(so.InputError, match="ends within a line"):
         so.read_structure(path)
     path.with_suffix(suffix).unlink()
-    with pytest.raises(so.InputError, match=rf"there is no job\{suffix} beside it|there is no file"):
+    with pytest.raises(so.InputError, match=missing):
         so.read_structure(path)
 
 

@@ -234,10 +234,17 @@ def test_rayleigh_from_ratios_has_these_ratios(structure, chain):
 
 
 @pytest.mark.parametrize(
-    "pairs", [((1, 0.1), (1, 0.1)), ((0, 0.1), (1, 0.1)), ((1, 0.1), (2, -1)), (1, 2), ((1,), (2,))]
+    ("pairs", "message"),
+    [
+        (((1, 0.1), (1, 0.1)), "two different frequencies, not twice 1"),
+        (((0, 0.1), (1, 0.1)), r"a circular frequency above 0 .*, not \(0, 0.1\)"),
+        (((1, 0.1), (2, -1)), r"a damping ratio from 0 on, not \(2, -1\)"),
+        ((1, 2), "first must be two finite numbers, .* not 1"),
+        (((1,), (2,)), r"first must be two finite numbers, .* not \(1,\)"),
+    ],
 )
-def test_rayleigh_refuses_what_has_no_answer(pairs):
-    with pytest.raises(so.InputError, match=r"from_ratios|must be two finite numbers"):
+def test_rayleigh_refuses_what_has_no_answer(pairs, message):
+    with pytest.raises(so.InputError, match=message):
         so.Rayleigh.from_ratios(*pairs)
 
 

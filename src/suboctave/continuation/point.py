@@ -67,7 +67,7 @@ def solved_point(
     regular = getattr(curve, "regular", None)
     own = None if regular is None else regular(guess)
     if own is not None:
-        point: CurvePoint = own.solved_point(guess, row, weights, newton, along, arclength)
+        point: CurvePoint = own.solved_point(guess, row, weights, newton, along, arclength, spare)
         return point
     return make_point(correct(curve, guess, row, weights, newton, spare=spare), along, arclength)
 

@@ -327,6 +327,7 @@ class BlownUp:
         newton: NewtonOptions,
         along: Array | None,
         arclength: float,
+        spare: float,
     ) -> CurvePoint:
         """See `continuation.point.solved_point`: what is given and what comes out are of the curve of motions, and the
         plane is the one that touches there.
@@ -336,7 +337,7 @@ class BlownUp:
         plane = row * weights
         x, w = plane[:-1], np.where(self.odd, u[:-2], 0.0)
         plane = np.concatenate((np.where(self.odd, u[-2] * x, x), [float(x @ w), plane[-1]])) / own
-        solved = correct(self, u, plane / length(plane), own, newton)
+        solved = correct(self, u, plane / length(plane), own, newton, spare=spare)
         if solved.u[-2] <= 0.0:
             raise ConvergenceError("what was found lies elsewhere")
         heading = None if along is None else self.along(u, along)

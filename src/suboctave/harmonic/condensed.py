@@ -33,6 +33,7 @@ from suboctave.errors import ConvergenceError, InputError, shortened
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.elimination import ComplexModes, Stack, complex_modes
 from suboctave.harmonic.linear_part import (
+    EquationOfMotion,
     LinearPart,
     StructuralMatrices,
     damping_words,
@@ -45,8 +46,6 @@ from suboctave.harmonic.linear_part import (
 from suboctave.harmonic.reduction import Reduction
 from suboctave.lazy import lazy
 from suboctave.model.inputs import check_count, check_is_system, observed_dof
-from suboctave.model.matrices import viscous_damping
-from suboctave.model.modes import Modes, modes_of
 from suboctave.model.projected import projected_words
 from suboctave.model.system import System
 
@@ -70,7 +69,7 @@ class Coordinates(NamedTuple):
     held: Array
 
 
-class Condensed:
+class Condensed(EquationOfMotion):
     """The condensed linear part of a system at values of its parameters; made by `linear_part_of`.
 
     `size` unknowns, `covers` the highest circular frequency that its basis is made for.
@@ -88,8 +87,8 @@ class Condensed:
         self._wider: Condensed | None = None
         #: what was asked for last, by frequencies
         self._last: tuple[NDArray[Any], tuple[ComplexArray, ComplexArray, dict[Any, Any]]] | None = None
-        #: M, C, K, S, (4, r, r)
-        self._matrices = np.array([matrix.value(values) for matrix in self.projected.matrices])
+        self.matrices = np.array([matrix.value(values) for matrix in self.projected.matrices])
+        self.terms = self.projected.terms
         #: the loads' directions in the equation of motion, (l, N)
         self._loads = self.seen(reduction.loads)
 
@@ -123,7 +122,7 @@ class Condensed:
         own = damping_words(self.system)
         if self.projected.shapes is None:
             return own
-        return projected_words(self.system.n, len(self._matrices[0]), self.covers, self.error), *own
+        return projected_words(self.system.n, len(self.matrices[0]), self.covers, self.error), *own
 
     # ------------------------------------------------------------------------------------------------- other values
     def rebuilt(self, values: Mapping[str, float]) -> Condensed:
@@ -159,7 +158,7 @@ class Condensed:
     # -------------------------------------------------------------------------------------------------- coordinates
     @lazy
     def _coordinates(self) -> Coordinates:
-        mass, _, stiffness, _ = self._matrices
+        mass, _, stiffness, _ = self.matrices
         mass, stiffness = 0.5 * (mass + mass.T), 0.5 * (stiffness + stiffness.T)
         values, modes = eigh(stiffness, mass)
         # a unit of stiffness that the structure has, also where some of it moves freely
@@ -201,10 +200,8 @@ class Condensed:
     def _parts(self) -> list[tuple[Array, ...]]:
         """M, C, K, S in the coordinates (q, z), see `_split`."""
         static, free, squares, unit, held = self._coordinates
-        m, k = self.size, self._matrices[2]
-        mass, damping, skew, structural = self._split(
-            np.array([*self._matrices[:2], 0.5 * (k - k.T), self._matrices[3]])
-        )
+        m, k = self.size, self.matrices[2]
+        mass, damping, skew, structural = self._split(np.array([*self.matrices[:2], 0.5 * (k - k.T), self.matrices[3]]))
         # K = S - unit M, and S has no coupling
         qq, qz, zq = (one - unit * other for one, other in zip(skew[:3], mass[:3], strict=True))
         qq[:, :m] += held
@@ -281,7 +278,7 @@ class Condensed:
         whole = self._plain
         other = copy.copy(self)
         other._last = other._other = other._wider = None
-        other._matrices = fed_matrices(self._matrices, rate)
+        other.matrices = fed_matrices(self.matrices, rate)
         for made in ("_equation", "_parts", "_plain", "_feeding"):
             vars(other).pop(made, None)
         vars(other)["_modes"], vars(other)["_own"] = None, whole._replace(entries=fed_matrices(whole.entries, rate))
@@ -294,7 +291,7 @@ class Condensed:
 
     @lazy
     def _feeding(self) -> Stack:
-        return Stack.of(self._split(feeding_matrices(self._matrices), self._modes))
+        return Stack.of(self._split(feeding_matrices(self.matrices), self._modes))
 
     def _unknowns_alone(self, whole: ComplexArray) -> ComplexArray:
         """Without the loads' columns."""
@@ -331,25 +328,6 @@ class Condensed:
             return self
         made_for = self.made_for or {}
         return linear_part_of(self.system, self.values, **{**made_for, "held": [*self.held, dof]})
-
-    def equation_of_motion(self) -> tuple[Array, Array, Array]:
-        """M, C, K of the structure in its basis, C with what stands for structural damping."""
-        return self._equation
-
-    @lazy
-    def _equation(self) -> tuple[Array, Array, Array]:
-        mass, damping, stiffness, structural = self._matrices
-        if structural.any():
-            damping = damping + viscous_damping(mass, structural, self._undamped)
-        return mass, damping, stiffness
-
-    def modes(self) -> Modes:
-        """See `LinearPart.modes`."""
-        return self._undamped
-
-    @lazy
-    def _undamped(self) -> Modes:
-        return modes_of(self._matrices[0], self._matrices[2], self.projected.terms)
 
     def read(self, motion: Array) -> Array:
         """See `LinearPart.read`."""

@@ -110,7 +110,36 @@ class LinearPart(Protocol):
         """By identity: what depends on the linear part alone is kept with it as the key."""
 
 
-class StructuralMatrices:
+class EquationOfMotion:
+    """What a linear part reads from the matrices of its equation of motion, M, C, K and S, (4, N, N).
+
+    `terms`: of a projection, as `modes_of` takes them.
+    """
+
+    matrices: Array
+    terms: Array | None = None
+
+    def equation_of_motion(self) -> tuple[Array, Array, Array]:
+        """M, C, K, C with what stands for structural damping."""
+        return self._equation
+
+    @lazy
+    def _equation(self) -> tuple[Array, Array, Array]:
+        mass, damping, stiffness, structural = self.matrices
+        if structural.any():
+            damping = damping + viscous_damping(mass, structural, self._undamped)
+        return mass, damping, stiffness
+
+    def modes(self) -> Modes:
+        """See `LinearPart.modes`."""
+        return self._undamped
+
+    @lazy
+    def _undamped(self) -> Modes:
+        return modes_of(self.matrices[0], self.matrices[2], self.terms)
+
+
+class StructuralMatrices(EquationOfMotion):
     """Stiffness form straight from a system's matrices: `A = K - Omega^2 M + i Omega C + i sgn(Omega) S`."""
 
     def __init__(self, system: System, values: Mapping[str, float] | None = None) -> None:
@@ -118,7 +147,6 @@ class StructuralMatrices:
         self.values = dict(system.parameters if values is None else values)
         self.size = system.n
         self.loads = np.zeros((0, system.n))
-        #: M, C, K, S, shape (4, n, n)
         self.matrices = np.array([matrix.value(self.values) for matrix in system.linear_parts])
 
     def __repr__(self) -> str:
@@ -157,25 +185,6 @@ class StructuralMatrices:
     def loaded(self, frequency: Array, names: tuple[str, ...] = (), order: int = 0) -> ComplexArray | None:
         """The unknowns hold all loads."""
         return None
-
-    def equation_of_motion(self) -> tuple[Array, Array, Array]:
-        """M, C, K of the system, C with what stands for structural damping."""
-        return self._equation
-
-    @lazy
-    def _equation(self) -> tuple[Array, Array, Array]:
-        mass, damping, stiffness, structural = self.matrices
-        if structural.any():
-            damping = damping + viscous_damping(mass, structural, self._undamped)
-        return mass, damping, stiffness
-
-    def modes(self) -> Modes:
-        """See `LinearPart.modes`."""
-        return self._undamped
-
-    @lazy
-    def _undamped(self) -> Modes:
-        return modes_of(self.matrices[0], self.matrices[2])
 
     def expand(self, direction: Array) -> Array:
         """The unknowns are the DOFs of the equation of motion."""
