@@ -19,7 +19,9 @@ oscillator = so.library.duffing(c=DAMPING, alpha=ALPHA, F=FORCE)
 curve = so.frequency_response(oscillator, omega=(2.4, 0.6))
 check = so.verify(curve, every=3)
 print(check)
-test = so.stepped_sine(oscillator, (0.8, 2.2), steps=140, direction="both", settle=120, measure=24, noise=0.01)
+test = so.stepped_sine(
+    oscillator, (0.8, 2.2), values=141, direction=("up", "down"), transient=120, periods=24, noise=0.01
+)
 print(test)
 print(test.to_dataframe().iloc[::20, :4].to_string())
 

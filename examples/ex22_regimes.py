@@ -15,7 +15,7 @@ import suboctave as so
 system = so.library.reference_oscillator(regularization=3000.0)
 regimes = so.regime_map(system, omega=(1.9, 3.3), parameter="j", bounds=(0.0, 0.7), depth=1)
 print(regimes)
-checked = regimes.check(points=30, seed=5, states=2)
+checked = regimes.check(points=30, seed=5, starts=2)
 print(checked)
 
 if len(sys.argv) > 1:

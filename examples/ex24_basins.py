@@ -30,7 +30,7 @@ assert abs(sum(found.shares.values()) - 1.0) < 1e-12
 # Trajectories of 400 periods end where the basins say.
 cells = [(8, 10), (23, 60), (40, 40), (55, 31), (71, 66)]
 states = [[found.x[i], found.y[j]] for i, j in cells]
-sections = so.poincare_sections(system, states, omega=OMEGA, transient=400, periods=6)
+sections = so.poincare_sections(system, start=states, omega=OMEGA, transient=400, periods=6)
 for number, (i, j) in enumerate(cells):
     expected = found.attractors[found.labels[j, i]]
     assert abs(sections.attractor(number).amplitude - expected.amplitude) < 1e-4

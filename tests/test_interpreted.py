@@ -32,8 +32,8 @@ def results() -> dict[str, list]:
         "kinds": [b.kind for b in bifurcations],
         "frequencies": [b.omega for b in bifurcations],
         "tracked": [*tracked.omega[[0, -1]], *tracked.amplitude[[0, -1]]],
-        "accurate": so.integrate(mixed, state, **periods).end.tolist(),
-        "newmark": so.integrate(mixed, state, method="newmark", steps_per_period=200, **periods).end.tolist(),
+        "accurate": so.integrate(mixed, start=state, **periods).end.tolist(),
+        "newmark": so.integrate(mixed, start=state, method="newmark", steps_per_period=200, **periods).end.tolist(),
         "exponents": so.lyapunov_exponents(stops, omega=1.0, transient=1, periods=2).exponents.tolist(),
     }
 

@@ -14,7 +14,7 @@ import suboctave as so
 
 oscillator = so.library.reference_oscillator(p=1.6, Kc=4.2, j=0.0, regularization=3000.0)
 scan = so.brute_force_diagram(
-    oscillator, (2.3, 4.0), count=171, start=("down", "rest"), transient=500, periods=100, workers=2
+    oscillator, (2.3, 4.0), values=171, direction=("down", "anew"), transient=500, periods=100, workers=2
 )
 print(scan)
 

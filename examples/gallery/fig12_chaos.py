@@ -15,7 +15,7 @@ oscillator = so.library.reference_oscillator(p=1.7, regularization=3000.0)
 response = so.frequency_response(oscillator, omega=(4.2, 2.2))
 doubled = so.switch_branch(response.bifurcations["PD"][0])
 second = so.track(doubled.bifurcations["PD"][0], "p", (0.9, 2.0), max_step=0.02)
-chart = so.lyapunov_map(oscillator, (2.2, 3.2), parameter="p", values=(0.9, 2.0), counts=(50, 34))
+chart = so.lyapunov_map(oscillator, (2.2, 3.2), parameter="p", bounds=(0.9, 2.0), grid=(50, 34))
 print(chart)
 
 if len(sys.argv) > 1:

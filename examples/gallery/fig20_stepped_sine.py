@@ -14,8 +14,8 @@ import suboctave as so
 
 oscillator = so.library.reference_oscillator(p=0.55, j=0.5, regularization=3000.0)
 response = so.frequency_response(oscillator, omega=(2.9, 1.9))
-small = so.stepped_sine(oscillator, (2.0, 2.9), steps=2, direction="down").ends[0, 0]
-test = {"steps": 70, "direction": "both", "state": small}
+small = so.stepped_sine(oscillator, (2.0, 2.9), values=3, direction="down").ends[0, 0]
+test = {"values": 71, "direction": ("up", "down"), "start": small}
 plain = so.stepped_sine(oscillator, (2.0, 2.7), **test)
 tapped = so.stepped_sine(oscillator, (2.0, 2.7), tap=(2.3, 0, 0.9), **test)
 print(plain, tapped, sep="\n")
@@ -36,5 +36,5 @@ for run in (plain, tapped):
     assert (run.period == 0).sum() <= 1
     for s in range(2):
         for v in np.flatnonzero(run.period[s]):
-            orbit = so.periodic_orbit(oscillator, run.omega[v], state=run.ends[s, v], subharmonic=int(run.period[s, v]))
+            orbit = so.periodic_orbit(oscillator, run.omega[v], start=run.ends[s, v], subharmonic=int(run.period[s, v]))
             assert np.isclose(abs(run.response[s, v, 0]), abs(orbit.harmonic(1)), rtol=1e-3), (run.omega[v], s)

@@ -26,9 +26,9 @@ def spring(text):
 
 
 MISTAKES = {
-    "steps that would not fit": (lambda: so.stepped_sine(DUFFING, (0.5, 0.6), steps=10**9), "count"),
-    "steps beyond any array": (lambda: so.stepped_sine(DUFFING, (0.5, 0.6), steps=HUGE), "whole number"),
-    "settling for years": (lambda: so.stepped_sine(DUFFING, (0.5, 0.6), settle=10**8, steps=10**4), "waited"),
+    "steps that would not fit": (lambda: so.stepped_sine(DUFFING, (0.5, 0.6), values=10**9), "count"),
+    "steps beyond any array": (lambda: so.stepped_sine(DUFFING, (0.5, 0.6), values=HUGE), "whole number"),
+    "settling for years": (lambda: so.stepped_sine(DUFFING, (0.5, 0.6), transient=10**8, values=10**4), "waited"),
     "a grid that would not fit": (lambda: so.basins(DUFFING, **SQUARE, grid=(10**6, 10**6)), "fit"),
     "a side beyond any array": (lambda: so.basins(DUFFING, **SQUARE, grid=(HUGE, 2)), "whole number"),
     "basins for years": (lambda: so.basins(DUFFING, **SQUARE, grid=(2000, 2000), periods=10**8), "waited"),
@@ -46,7 +46,7 @@ MISTAKES = {
         "periods must be at most",
     ),
     "a diagram that would not fit": (
-        lambda: so.brute_force_diagram(DUFFING, omega=(0.5, 1.0), count=10**7, periods=100),
+        lambda: so.brute_force_diagram(DUFFING, omega=(0.5, 1.0), values=10**7, periods=100),
         "fit",
     ),
     "exponents for years": (
@@ -54,7 +54,7 @@ MISTAKES = {
         "fit",
     ),
     "a map that would not fit": (
-        lambda: so.lyapunov_map(DUFFING, omega=(0.5, 1.0), parameter="F", values=(0.5, 1.0), counts=(10**5, 10**5)),
+        lambda: so.lyapunov_map(DUFFING, omega=(0.5, 1.0), parameter="F", bounds=(0.5, 1.0), grid=(10**5, 10**5)),
         "fit",
     ),
     "a parameter of 400 digits": (lambda: so.library.duffing(F=HUGE), "finite"),
@@ -66,7 +66,7 @@ MISTAKES = {
     "a range of 400 digits": (lambda: so.frequency_response(DUFFING, (0.5, HUGE)), "must be a finite number"),
     "a frequency of 400 digits": (lambda: so.integrate(DUFFING, omega=HUGE), "positive number"),
     "a step of 400 digits": (lambda: so.frequency_response(DUFFING, (0.5, 0.6), max_step=HUGE), "max_step"),
-    "a state of 400 digits": (lambda: so.integrate(DUFFING, [HUGE, 0], omega=1.0), "finite numbers"),
+    "a state of 400 digits": (lambda: so.integrate(DUFFING, start=[HUGE, 0], omega=1.0), "finite numbers"),
     "too sharp a stop": (lambda: so.library.reference_oscillator(regularization=1e300), "exact law"),
     "too blunt a stop": (lambda: so.library.reference_oscillator(regularization=1e-300), "exact law"),
     "too sharp a play": (
@@ -106,11 +106,11 @@ MISTAKES = {
     "half a worker": (lambda: so.poincare_sections(DUFFING, omega=1.0, workers=1.5), "workers"),
     "not a number of workers": (lambda: so.poincare_sections(DUFFING, omega=[1.0] * 40, workers=np.nan), "workers"),
     "a parameter as a list": (
-        lambda: so.brute_force_diagram(DUFFING, omega=1.0, parameter=[], values=(0, 1)),
+        lambda: so.brute_force_diagram(DUFFING, omega=1.0, parameter=[], bounds=(0, 1)),
         "parameter must be a text",
     ),
-    "ragged states": (lambda: so.brute_force_diagram(DUFFING, omega=(0.5, 1), states=[[1, 2], [3]]), "finite numbers"),
-    "nowhere to begin": (lambda: so.brute_force_diagram(DUFFING, omega=(0.5, 1), start=[]), "start"),
+    "ragged states": (lambda: so.brute_force_diagram(DUFFING, omega=(0.5, 1), start=[[1, 2], [3]]), "finite numbers"),
+    "nowhere to begin": (lambda: so.brute_force_diagram(DUFFING, omega=(0.5, 1), direction=[]), "direction"),
     "two trajectories, one setting": (lambda: so.TwoTrajectories(steps_per_period=5), "list of positive whole numbers"),
     "two trajectories, no offset": (lambda: so.TwoTrajectories(offset=()), "offset"),
     "a seed in words": (lambda: so.stepped_sine(DUFFING, (0.5, 0.6), seed="x"), "seed"),

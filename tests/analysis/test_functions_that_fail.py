@@ -99,7 +99,7 @@ def test_searches_keep_what_they_have_too():
     assert len(branch) > 10
     law = Counted(4000, wrong)
     with pytest.raises(so.FunctionError, match="no such force") as raised:
-        so.brute_force_diagram(called(law), (0.8, 1.4), count=40, workers=1)
+        so.brute_force_diagram(called(law), (0.8, 1.4), values=40, workers=1)
     assert not raised.value.result.complete
 
 
@@ -116,7 +116,7 @@ VERBS = {
     "in time": lambda system, **given: so.integrate(system, omega=1.0, periods=1000, **given),
     "exponents": lambda system, **given: so.lyapunov_exponents(system, omega=1.0, **given),
     "sections": lambda system, **given: so.poincare_sections(system, omega=1.0, **given),
-    "brute force": lambda system, **given: so.brute_force_diagram(system, (0.8, 1.4), count=20, workers=1, **given),
+    "brute force": lambda system, **given: so.brute_force_diagram(system, (0.8, 1.4), values=20, workers=1, **given),
     "stepped sine": lambda system, **given: so.stepped_sine(system, (0.8, 1.4), **given),
 }
 
@@ -138,6 +138,6 @@ def test_a_time_limit_is_looked_at_wherever_a_slow_law_is_called(name):
 def test_ctrl_c_reaches_a_law_that_compiled_code_calls():
     """No exception passes through C: it would be lost there."""
     law = Counted(200, lambda: signal.raise_signal(signal.SIGINT))
-    diagram = so.brute_force_diagram(called(law), (0.8, 1.4), count=100, workers=1)
+    diagram = so.brute_force_diagram(called(law), (0.8, 1.4), values=100, workers=1)
     assert diagram.interruption is not None
     assert not diagram.complete

@@ -259,11 +259,13 @@ def test_searches_in_time_end_with_what_is_there(duffing_curve, ticks):
 
     diagram = halved(
         lambda seconds: so.brute_force_diagram(
-            system, (0.8, 1.2), count=8, start="up", transient=20, periods=12, seconds=seconds
+            system, (0.8, 1.2), values=8, direction="up", transient=20, periods=12, seconds=seconds
         )
     )
     assert 0 < int((diagram.period >= 0).sum()) < diagram.period.size
-    test = halved(lambda seconds: so.stepped_sine(system, (0.8, 1.2), steps=8, settle=20, measure=6, seconds=seconds))
+    test = halved(
+        lambda seconds: so.stepped_sine(system, (0.8, 1.2), values=9, transient=20, periods=6, seconds=seconds)
+    )
     assert 0 < int(np.isnan(test.response).sum()) < test.response.size
     found = halved(lambda seconds: so.verify(duffing_curve, every=3, seconds=seconds))
     assert len(found.points) + len(found.bifurcations) < len(range(0, len(duffing_curve), 3)) + 2

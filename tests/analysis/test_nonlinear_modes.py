@@ -156,7 +156,7 @@ def test_every_motion_of_a_tongue_is_one(tongue):
     """By time integration over a period."""
     system = two_masses()
     for orbit in tongue.orbits[::20]:
-        end = so.integrate(system, orbit.start(), omega=orbit.omega, periods=1, tolerance=1e-11)
+        end = so.integrate(system, start=orbit.start(), omega=orbit.omega, periods=1, tolerance=1e-11)
         assert end.displacement[-1] == pytest.approx(orbit.displacement(0.0), abs=2e-4)
 
 

@@ -56,7 +56,7 @@ def levels_at(branch, omega):
 def test_from_a_state_in_time(oscillator, isola):
     """Integration settles on the stable motion; harmonic balance continues it."""
     known = isola.orbits[int(np.argmax(isola.stable))]
-    orbit = so.periodic_orbit(oscillator, known.omega, state=1.02 * known.start(), subharmonic=3, settle=20)
+    orbit = so.periodic_orbit(oscillator, known.omega, start=1.02 * known.start(), subharmonic=3, transient=20)
     assert orbit.basis.nu == 3
     np.testing.assert_allclose(orbit.amplitude(), known.amplitude(), rtol=1e-5)
     again = so.continue_branch(orbit, "omega", (2.0, 12.0))
@@ -79,8 +79,8 @@ def test_wrong_input(oscillator, isola):
         so.frequency_response(oscillator, (2.0, 5.0), subharmonic=2.5)
     with pytest.raises(InputError, match="leave one of them out"):
         so.frequency_response(oscillator, (5.0, 6.0), subharmonic=2, start=isola.orbits[0])
-    with pytest.raises(InputError, match="state must be 2 finite numbers"):
-        so.periodic_orbit(oscillator, 5.0, state=[1.0])
+    with pytest.raises(InputError, match="start must be 2 finite numbers"):
+        so.periodic_orbit(oscillator, 5.0, start=[1.0])
     with pytest.raises(InputError, match="Seeds: phases"):
         so.Seeds(phases=0)
 
@@ -89,7 +89,7 @@ def test_wrong_input(oscillator, isola):
 def test_a_motion_that_repeats_earlier_has_its_own_period(omega, asked):
     """Nothing but the load's motion is near: it is none of three periods because three were asked for."""
     system = so.library.duffing(c=0.1, F=0.1)
-    orbit = so.periodic_orbit(system, omega, state=[0.1, 0.0], subharmonic=asked)
+    orbit = so.periodic_orbit(system, omega, start=[0.1, 0.0], subharmonic=asked)
     assert orbit.basis.nu == orbit.own_period == 1
-    same = so.periodic_orbit(system, omega, state=[0.1, 0.0])
+    same = so.periodic_orbit(system, omega, start=[0.1, 0.0])
     assert orbit.amplitude() == pytest.approx(same.amplitude(), rel=1e-8)

@@ -74,7 +74,7 @@ def results():
     tracked = so.track(fold, "F", (0.29, 0.31))
     mode = so.nonlinear_mode(so.System(1.0, 0.0, 1.0, [so.CubicSpring(0, 1.0)]), amplitude=0.2, harmonics=3)
     motion = so.integrate(system, omega=1.0, periods=2)
-    brute = so.brute_force_diagram(system, (1.0, 1.1), count=2, transient=5, periods=8)
+    brute = so.brute_force_diagram(system, (1.0, 1.1), values=2, transient=5, periods=8)
     return {
         **dict.fromkeys(("curve", "branch"), (branch, tracked, mode)),
         **dict.fromkeys(("orbit", "motion"), (branch.orbits[0], motion)),

@@ -68,7 +68,11 @@ def test_without_a_declaration_the_drift_is_recognised_and_said():
     found = sections.attractor(0)
     assert (found.kind, found.period, found.drift.period) == ("drifting", 0, 2)
     assert found.drift.step[0] == pytest.approx(-2.0 * TURN, rel=1e-9)
-    for said in (repr(found), repr(sections), repr(so.brute_force_diagram(free, OMEGA, parameter="FD", values=[1.44]))):
+    for said in (
+        repr(found),
+        repr(sections),
+        repr(so.brute_force_diagram(free, OMEGA, parameter="FD", bounds=(1.4, 1.5), values=[1.44])),
+    ):
         assert "x turns by -2 pi in each period: declare angles=['x']" in said
     with pytest.raises(so.InputError, match="is not periodic"):
         so.basins(free, omega=OMEGA, box=((-1, 1), (-1, 1)), grid=(2, 2), attractors=found)
@@ -108,7 +112,7 @@ def test_locked_rotations(turns, periods, equation):
     speed, m = turns / periods, periods
     for sense in (1, -1):
         system = so.System.from_equations(equation, {"c": 0.2, "s": float(sense)}, angles=["x"])
-        found = so.poincare_sections(system, [0.1, sense * speed], omega=1.0, transient=150).attractor(0)
+        found = so.poincare_sections(system, start=[0.1, sense * speed], omega=1.0, transient=150).attractor(0)
         assert (found.period, found.turns) == (periods, (sense * turns,))
         phi = sense * np.arcsin(-0.2 * speed) / m
         at = found.points[np.argmin(np.abs(modulo(found.points[:, 0] - phi)))]
@@ -148,7 +152,7 @@ def test_librations_about_another_turn_are_those_about_none():
     for method, off in (("accurate", 1e-6), ("newmark", 1e-4)):
         sections = so.poincare_sections(
             system,
-            [[0.1, 0.0], [TURN + 0.1, 0.0], [-3.0 * TURN, 0.1]],
+            start=[[0.1, 0.0], [TURN + 0.1, 0.0], [-3.0 * TURN, 0.1]],
             omega=1.0,
             transient=60,
             periods=9,
@@ -156,7 +160,7 @@ def test_librations_about_another_turn_are_those_about_none():
         )
         (found,) = sections.attractors
         assert (found.period, found.count, found.turns) == (1, 3, (0,))
-        orbit = so.periodic_orbit(system, 1.0, state=found.state)
+        orbit = so.periodic_orbit(system, 1.0, start=found.state)
         assert found.amplitude == pytest.approx(orbit.amplitude(0), rel=10.0 * off)
         assert found.points[0] == pytest.approx(orbit.start(), abs=off)
 
@@ -180,7 +184,10 @@ def test_a_trajectory_goes_on_through_turns():
 
 def test_a_stepped_sine_measures_what_turns_without_its_drift():
     """The harmonics of x + omega t are those of a periodic motion: independent of how long is measured."""
-    first, second = (so.stepped_sine(pendulum(1.35), [OMEGA], settle=150, measure=m, harmonics=(1, 2)) for m in (6, 30))
+    first, second = (
+        so.stepped_sine(pendulum(1.35), (OMEGA, 1.0), values=[OMEGA], transient=150, periods=m, harmonics=(1, 2))
+        for m in (6, 30)
+    )
     assert first.period.tolist() == [[1]]
     assert first.components[0, 0, :, 0] == pytest.approx(second.components[0, 0, :, 0], rel=1e-5)
     assert first.largest[0, 0, 0] == pytest.approx(np.pi)
@@ -204,7 +211,7 @@ def test_harmonic_balance_says_that_it_has_no_rotations():
     state = so.poincare_sections(pendulum(1.35), omega=OMEGA).attractor(0).state
     for angles in (("x",), ()):
         with pytest.raises(so.ConvergenceError, match=r"x grows by -6\.28319 in its period\. Harmonic"):
-            so.periodic_orbit(pendulum(1.35, angles), OMEGA, state=state)
+            so.periodic_orbit(pendulum(1.35, angles), OMEGA, start=state)
     with pytest.raises(so.ConvergenceError, match="follow what turns in time"):
         so.frequency_response(pendulum(1.35), (OMEGA, 0.9), start=state)
 
@@ -213,7 +220,7 @@ def test_files_keep_turns_and_angles(tmp_path):
     system = pendulum(1.44)
     kept = [
         so.poincare_sections(system, omega=OMEGA, periods=9),
-        so.brute_force_diagram(system, OMEGA, parameter="FD", values=[1.35, 1.44], start="up", periods=9),
+        so.brute_force_diagram(system, OMEGA, parameter="FD", bounds=(1.35, 1.44), values=2, direction="up", periods=9),
     ]
     for i, one in enumerate(kept):
         one.save(tmp_path / f"{i}.nc")
@@ -234,7 +241,7 @@ def test_basins_of_rotations():
     assert found.contradicted == 0
     x, v = (np.linspace(*side, 9) for side in box)
     states = np.column_stack([np.tile(x, 9), np.repeat(v, 9)])
-    settled = so.poincare_sections(system, states, omega=OMEGA, transient=60, periods=6)
+    settled = so.poincare_sections(system, start=states, omega=OMEGA, transient=60, periods=6)
     turns = np.array([settled.attractor(i).turns[0] for i in range(81)]).reshape(9, 9)
     assert {(int(label), int(turn)) for label, turn in zip(found.labels.ravel(), turns.ravel(), strict=True)} == {
         (int(label), int(turns[found.labels == label][0])) for label in (0, 1)
@@ -248,7 +255,7 @@ def test_basins_of_rotations():
 def test_a_regime_map_is_told_of_rotations():
     """At loads at which the pendulum turns over the map has its librations only: what turns is listed as such."""
     found = so.regime_map(pendulum(1.2), (0.6, 0.7), "FD", (1.3, 1.4), harmonics=9, depth=0, values=1)
-    checked = found.check(points=3, states=3, transient=60)
+    checked = found.check(points=3, starts=3, transient=60)
     assert isinstance(checked, RegimeCheck)
     assert checked.counts.get(ROTATES)
     assert ROTATES in {one.verdict for one in checked.disagreements}

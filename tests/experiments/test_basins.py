@@ -25,7 +25,7 @@ def found():
 def test_labels_are_what_long_integration_finds(found):
     x, y = np.meshgrid(found.x, found.y)
     states = np.column_stack([x.ravel(), y.ravel()])
-    sections = so.poincare_sections(DUFFING, states, omega=1.5, transient=400, periods=6)
+    sections = so.poincare_sections(DUFFING, start=states, omega=1.5, transient=400, periods=6)
     ends = np.array([sections.attractor(i).amplitude for i in range(len(states))])
     said = np.array([found.attractors[i].amplitude for i in found.labels.ravel()])
     assert np.abs(ends / said - 1.0).max() < 1e-3
@@ -60,7 +60,7 @@ def test_a_plane_of_two_degrees_of_freedom():
         loads=[so.HarmonicLoad(0, amplitude=0.3), so.HarmonicLoad(1, amplitude=0.2)],
     )  # fmt: skip
     rest = [0.0, 0.7, 0.0, -0.4]
-    both = so.basins(system, omega=1.5, box=BOX, grid=(12, 10), plane=("x_0", "v_0"), rest=rest)
+    both = so.basins(system, omega=1.5, box=BOX, grid=(12, 10), plane=("x_0", "v_0"), start=rest)
     alone = so.basins(DUFFING, omega=1.5, box=BOX, grid=(12, 10))
     first = np.vectorize(lambda i: both.attractors[i].amplitude)(both.labels)
     second = np.vectorize(lambda i: alone.attractors[i].amplitude)(alone.labels)

@@ -58,8 +58,8 @@ def test_sizes_do_not_depend_on_units():
 
 # --------------------------------------------------------------------------------------------------------- integrate
 def test_a_trajectory_from_a_periodic_motion_repeats(oscillator):
-    orbit = so.periodic_orbit(oscillator, 2.25, state=[0.1, 0.0], harmonics=40)
-    motion = so.integrate(oscillator, orbit, omega=2.25, periods=3, steps_per_period=50)
+    orbit = so.periodic_orbit(oscillator, 2.25, start=[0.1, 0.0], harmonics=40)
+    motion = so.integrate(oscillator, start=orbit, omega=2.25, periods=3, steps_per_period=50)
     assert motion.time.shape == (151,)
     assert motion.displacement.shape == motion.velocity.shape == (151, 1)
     np.testing.assert_allclose(motion.stroboscopic, np.repeat(orbit.start()[None], 4, axis=0), atol=2e-6)
@@ -70,7 +70,7 @@ def test_a_trajectory_from_a_periodic_motion_repeats(oscillator):
 
 
 def test_a_trajectory_is_that_of_scipy(oscillator):
-    motion = so.integrate(oscillator, [0.9, 1.0], omega=2.3, periods=4, transient=2, parameters={"p": 0.8})
+    motion = so.integrate(oscillator, start=[0.9, 1.0], omega=2.3, periods=4, transient=2, parameters={"p": 0.8})
     period = 2 * np.pi / 2.3
     t = np.linspace(2 * period, 6 * period, 801)
     other = scipy_integrate(oscillator, [0.9, 1.0], np.concatenate([[0.0], t]), 2.3, {"p": 0.8})
@@ -78,13 +78,13 @@ def test_a_trajectory_is_that_of_scipy(oscillator):
     np.testing.assert_allclose(motion.velocity, other.v[1:], atol=1e-8)
     np.testing.assert_allclose(motion.time, t - 2 * period, atol=1e-12)
     assert motion.largest[0] >= np.abs(other.x[1:]).max() - 1e-8
-    later = so.integrate(oscillator, motion.end, omega=2.3, periods=1, parameters={"p": 0.8})
+    later = so.integrate(oscillator, start=motion.end, omega=2.3, periods=1, parameters={"p": 0.8})
     assert np.array_equal(later.stroboscopic[0], motion.end)
 
 
 def test_wrong_input_to_integrate_is_refused(oscillator):
     for arguments, words in (
-        ({"state": [0.0]}, "2 finite numbers"),
+        ({"start": [0.0]}, "2 finite numbers"),
         ({"method": "newmarc"}, "did you mean 'newmark'"),
         ({"periods": 0}, "positive whole number"),
         ({"transient": -1}, "whole number"),
@@ -100,7 +100,7 @@ def test_wrong_input_to_integrate_is_refused(oscillator):
 
 # ---------------------------------------------------------------------------------------------------------- sections
 def test_coexisting_attractors_are_those_of_shooting(oscillator):
-    sections = so.poincare_sections(oscillator, GRID, omega=2.25, transient=400, periods=12)
+    sections = so.poincare_sections(oscillator, start=GRID, omega=2.25, transient=400, periods=12)
     found = sections.attractors
     assert sum(one.count for one in found) == len(GRID)
     assert [one.period for one in found] == [1, 2, 1]
@@ -120,7 +120,7 @@ def test_coexisting_attractors_are_those_of_shooting(oscillator):
 def test_attractors_of_the_regularised_oscillator():
     """Published setting of the isola: shooting gives 3.09017 and 0.88906 (2T) beside a small motion."""
     system = so.library.reference_oscillator(j=0.5, regularization=3000.0)
-    found = so.poincare_sections(system, GRID, omega=2.25, transient=400, periods=12).attractors
+    found = so.poincare_sections(system, start=GRID, omega=2.25, transient=400, periods=12).attractors
     assert [one.period for one in found] == [1, 2, 1]
     assert [one.amplitude for one in found[:2]] == pytest.approx([3.09017, 0.88906], abs=1e-5)
 
@@ -131,19 +131,27 @@ def test_a_diagram_doubles_where_the_branch_does():
     system = so.library.reference_oscillator()
     values = np.array([3.90, 3.96, 3.98, 4.02])
     # from rest another attractor is met, of period 3T
-    orbit = so.periodic_orbit(system, 4.02, state=[-0.05, 0.0], harmonics=30)
-    diagram = so.brute_force_diagram(system, values, start=("down", "rest"), state=orbit, transient=600, periods=12)
-    assert diagram.starts == ("down", "rest")
+    orbit = so.periodic_orbit(system, 4.02, start=[-0.05, 0.0], harmonics=30)
+    diagram = so.brute_force_diagram(
+        system,
+        (3.9, 4.02),
+        values=values,
+        direction="down",
+        start=[orbit.start(), [0.0, 0.0]],
+        transient=600,
+        periods=12,
+    )
+    assert diagram.starts == ("down 0", "down 1")
     assert diagram.period[0].tolist() == [2, 2, 1, 1]
     assert diagram.complete
-    for one in diagram.of("down"):
+    for one in diagram.of("down 0"):
         truth = shoot(system, one.state, one.omega, one.period)
         assert one.amplitude == pytest.approx(truth.amplitude, rel=2e-5)
     table = diagram.to_dataframe()
     assert list(table.columns[:2]) == ["omega", "start"]
     assert diagram.period[1, 3] == 3
     assert "T 2, 2T" in repr(diagram)
-    with pytest.raises(InputError, match="did you mean 'down'"):
+    with pytest.raises(InputError, match=r"did you mean .down 1."):
         diagram.of("dow")
 
 
@@ -151,7 +159,7 @@ def test_up_and_down_find_both_sides_of_a_hysteresis(oscillator):
     """Upwards the resonance is followed, downwards the small motion: both stable by shooting, at one frequency."""
     grid = np.linspace(1.25, 2.5, 51)
     diagram = so.brute_force_diagram(
-        oscillator, grid, start=("up", "down"), transient=60, periods=6, period_tolerance=1e-4
+        oscillator, (1.25, 2.5), values=51, direction=("up", "down"), transient=60, periods=6, period_tolerance=1e-4
     )
     at = int(np.argmin(np.abs(grid - 2.25)))
     up, down = (diagram.of(start)[at] for start in ("up", "down"))
@@ -163,9 +171,9 @@ def test_up_and_down_find_both_sides_of_a_hysteresis(oscillator):
 
 
 def test_a_parameter_is_varied_and_an_interruption_keeps_what_is_there(oscillator):
-    options = {"parameter": "p", "values": (0.1, 0.3), "count": 5, "transient": 20, "periods": 3}
-    whole = so.brute_force_diagram(oscillator, 2.25, start="up", states=[[0.5, 0.0]], **options)
-    assert whole.starts == ("up", "state 0")
+    options = {"parameter": "p", "bounds": (0.1, 0.3), "values": 5, "transient": 20, "periods": 3}
+    whole = so.brute_force_diagram(oscillator, 2.25, direction=("up", "anew"), **options)
+    assert whole.starts == ("up", "anew")
     np.testing.assert_allclose(whole.values, np.linspace(0.1, 0.3, 5))
     assert whole.points.shape == (2, 5, 3, 2)
     calls = []
@@ -175,7 +183,7 @@ def test_a_parameter_is_varied_and_an_interruption_keeps_what_is_there(oscillato
         if len(calls) == 2:
             raise KeyboardInterrupt
 
-    part = so.brute_force_diagram(oscillator, 2.25, start="up", progress=stop, **options)
+    part = so.brute_force_diagram(oscillator, 2.25, direction="up", progress=stop, **options)
     assert not part.complete
     assert part.period[0, 2:].tolist() == [-1, -1, -1]
     assert np.array_equal(part.points[0, :2], whole.points[0, :2])
@@ -184,11 +192,13 @@ def test_a_parameter_is_varied_and_an_interruption_keeps_what_is_there(oscillato
 def test_wrong_input_to_a_diagram_is_refused(oscillator):
     for arguments, words in (
         ({"omega": 2.0}, "range"),
-        ({"omega": (1.0, 2.0), "start": "upp"}, "did you mean 'up'"),
-        ({"omega": 2.0, "parameter": "pp", "values": (0, 1)}, "did you mean 'p'"),
-        ({"omega": 2.0, "parameter": "p"}, "values="),
-        ({"omega": (1.0, 2.0), "parameter": "p", "values": (0, 1)}, "positive number"),
-        ({"omega": (1.0, 2.0), "states": [[0.0]]}, "shape"),
+        ({"omega": (1.0, 2.0), "direction": "upp"}, "did you mean 'up'"),
+        ({"omega": 2.0, "parameter": "pp", "bounds": (0, 1)}, "did you mean 'p'"),
+        ({"omega": 2.0, "parameter": "p"}, "bounds="),
+        ({"omega": (1.0, 2.0), "parameter": "p", "bounds": (0, 1)}, "positive number"),
+        ({"omega": (1.0, 2.0), "start": [[0.0]]}, "start must be 2"),
+        ({"omega": (1.0, 2.0), "values": [3.0]}, "outside the range"),
+        ({"omega": (1.0, 2.0), "bounds": (0, 1)}, "parameter="),
         ({"omega": (1.0, 2.0), "observe": 1}, "out of range"),
         ({"omega": (1.0, 2.0), "period_tolerance": 0.0}, "period_tolerance"),
     ):
@@ -197,7 +207,7 @@ def test_wrong_input_to_a_diagram_is_refused(oscillator):
 
 
 def test_pictures_show_every_period(oscillator, tmp_path):
-    diagram = so.brute_force_diagram(oscillator, (2.0, 2.4), count=4, states=GRID[::7], transient=600, periods=6)
+    diagram = so.brute_force_diagram(oscillator, (2.0, 2.4), values=4, start=GRID[::7], transient=600, periods=6)
     curve = so.frequency_response(oscillator, omega=(2.0, 2.4), harmonics=9)
     figure = diagram.plot(tmp_path / "over.png", curves=curve)
     drawn = {line.get_gid() for line in figure.axes[0].lines}
@@ -210,12 +220,12 @@ def test_pictures_show_every_period(oscillator, tmp_path):
     marked = [line.get_xdata() for line in axes.lines if line.get_linestyle() == "None"]
     assert all(low <= x <= high for places in marked for x in places)
     assert (tmp_path / "over.png").stat().st_size > 1000
-    sections = diagram.plot(quantity="section", starts=["up"])
+    sections = diagram.plot(quantity="section", starts=["up 0"])
     shown = sum(len(line.get_xdata()) for line in sections.axes[0].lines)
     periods = diagram.period[0]
     assert shown == int(np.where(periods > 0, periods, 6).sum())
     with pytest.raises(InputError, match="did you mean 'section'"):
         diagram.plot(quantity="sections")
     so.integrate(oscillator, omega=2.0, periods=2).plot(tmp_path / "time.svg")
-    so.poincare_sections(oscillator, GRID[:3], omega=2.0, transient=10, periods=6).plot(tmp_path / "points.pdf")
+    so.poincare_sections(oscillator, start=GRID[:3], omega=2.0, transient=10, periods=6).plot(tmp_path / "points.pdf")
     assert {p.name for p in tmp_path.iterdir()} == {"over.png", "time.svg", "points.pdf"}

@@ -122,7 +122,7 @@ def test_all_degrees_of_freedom_on_request(stop):
 def test_a_motion_of_harmonic_balance_goes_on_in_time(curve, spring):
     point = max((p for p in curve.points if p.floquet.stable), key=lambda p: p.orbit.amplitude(TIP))
     orbit = point.orbit
-    path = so.integrate(spring, orbit, omega=orbit.omega, periods=3)
+    path = so.integrate(spring, start=orbit, omega=orbit.omega, periods=3)
     assert path.lost < 1e-12
     for dof in (4, 33, TIP):
         np.testing.assert_allclose(
@@ -133,7 +133,7 @@ def test_a_motion_of_harmonic_balance_goes_on_in_time(curve, spring):
 def test_what_does_not_fit_into_the_basis_is_told(spring):
     state = np.zeros(2 * N)
     state[[10, 11]] = 0.01, -0.01
-    path = so.integrate(spring, state, omega=1.0, periods=1)
+    path = so.integrate(spring, start=state, omega=1.0, periods=1)
     assert path.lost > 0.5
     assert "of the energy of the start do not fit" in repr(path)
 
@@ -142,12 +142,12 @@ def test_what_does_not_fit_into_the_basis_is_told(spring):
 def result(spring):
     """Of each experiment a short one, once, when it is asked for."""
     options = {"transient": 20, "periods": 6}
-    tapped = {"steps": 1, "settle": 30, "measure": 6, "harmonics": (1, 3), "tap": (1.0, 20, 0.1)}
-    points = {"parameter": "k", "values": (0.2, 0.3), "counts": (1, 1), "transient": 5, "periods": 16}
+    tapped = {"values": 2, "transient": 30, "periods": 6, "harmonics": (1, 3), "tap": (1.0, 20, 0.1)}
+    points = {"parameter": "k", "bounds": (0.2, 0.3), "grid": (1, 1), "transient": 5, "periods": 16}
     makers = {
         "trajectory": lambda: so.integrate(spring, omega=1.0, periods=2),
-        "sections": lambda: so.poincare_sections(spring, np.zeros((2, 2 * N)), omega=1.0, observe=20, **options),
-        "brute": lambda: so.brute_force_diagram(spring, (1.0, 1.01), count=2, **options),
+        "sections": lambda: so.poincare_sections(spring, start=np.zeros((2, 2 * N)), omega=1.0, observe=20, **options),
+        "brute": lambda: so.brute_force_diagram(spring, (1.0, 1.01), values=2, **options),
         "sine": lambda: so.stepped_sine(spring, (1.0, 1.01), **tapped),
         "lyapunov": lambda: so.lyapunov_exponents(spring, omega=1.0, periods=32, transient=10, count=1, trajectories=2),
         "map": lambda: so.lyapunov_map(spring, (1.0, 1.01), **points),
@@ -187,7 +187,7 @@ def test_attractors_of_a_diagram_are_motions_of_the_structure(result):
 
 
 def test_the_fundamental_of_a_stepped_sine_is_that_of_harmonic_balance(spring):
-    test = so.stepped_sine(spring, [0.97], settle=60, measure=6, harmonics=(1,))
+    test = so.stepped_sine(spring, (0.9, 1.0), values=[0.97], transient=60, periods=6, harmonics=(1,))
     orbit = so.frequency_response(spring, (0.97, 0.9), harmonics=5).orbits[0]
     for dof in (5, TIP):
         assert abs(test.harmonic(1, dof)[0]) == pytest.approx(abs(orbit.harmonic(1, dof)), rel=1e-2)
@@ -206,7 +206,7 @@ def test_basins_of_two_motions_of_a_structure(spring, curve, tmp_path):
     assert basins.contradicted == 0
     for one in basins.attractors:
         assert one.points.shape == (1, 2 * N)
-        path = so.integrate(spring, one, omega=omega, periods=1)
+        path = so.integrate(spring, start=one, omega=omega, periods=1)
         np.testing.assert_allclose(path.end, one.state, atol=1e-5 * one.amplitude)
         assert path.largest[TIP] == pytest.approx(one.amplitude, rel=1e-5)
     again = so.load(basins.save(tmp_path / "basins.nc"))
@@ -258,10 +258,10 @@ def test_a_stepped_sine_of_a_large_structure_is_not_refused_by_its_degrees_of_fr
     n = 100_000
     one = sparse.eye_array(n).tocsr()
     large = so.System(one, 0.1 * one, one, [so.CubicSpring(0, 1.0)], [so.HarmonicLoad(0, 0.1)])
-    plan = {"direction": "both", "settle": 10, "measure": 10, "state": None, "tap": None, "harmonics": [1.0]}
-    check_stepped_sine(large, (0.5, 1.5), steps=2000, noise=0.0, **plan)
+    plan = {"direction": ["up", "down"], "transient": 10, "periods": 10, "start": None, "tap": None, "harmonics": [1.0]}
+    check_stepped_sine(large, (0.5, 1.5), values=2000, noise=0.0, **plan)
     with pytest.raises(InputError, match="more than fit"):
-        check_stepped_sine(large, (0.5, 1.5), steps=5_000_000, noise=0.0, **plan)
+        check_stepped_sine(large, (0.5, 1.5), values=5_000_000, noise=0.0, **plan)
 
 
 def test_pictures_read_the_degree_of_freedom_that_they_draw(result, monkeypatch, tmp_path):

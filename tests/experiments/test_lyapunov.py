@@ -17,7 +17,7 @@ CHAOTIC = so.library.reference_oscillator(p=1.6, Kc=4.2, j=0.0)
 def test_periodic_motions_have_the_logarithms_of_their_multipliers():
     system = so.library.duffing(c=0.1, alpha=1.0, F=0.3)
     for state in ([0.0, 0.0], [1.5, 0.0]):
-        found = so.lyapunov_exponents(system, state, omega=1.5, periods=400, trajectories=8)
+        found = so.lyapunov_exponents(system, start=state, omega=1.5, periods=400, trajectories=8)
         motion = shoot(system, found.end, 1.5)
         expected = np.sort(np.log(np.abs(motion.multipliers)) / motion.period)[::-1]
         assert np.abs(found.exponents - expected).max() < 1e-6
@@ -62,7 +62,9 @@ def test_quasi_periodic_motion_has_a_zero_exponent():
         elements=[so.Expression(0, "0.3*(x**2 - 1)*x'")],
         loads=[so.HarmonicLoad(1, amplitude=1.0)],
     )  # fmt: skip
-    found = so.lyapunov_exponents(system, [1.0, 0.0, 0.0, 0.0], omega=1.3, periods=600, transient=200, trajectories=8)
+    found = so.lyapunov_exponents(
+        system, start=[1.0, 0.0, 0.0, 0.0], omega=1.3, periods=600, transient=200, trajectories=8
+    )
     assert abs(found.exponents[0]) < 1e-5
     assert np.abs(found.exponents[1:3] + 0.1).max() < 1e-5  # of x'' + 0.2 x' + 3 x
     assert found.chaotic is False
@@ -91,14 +93,14 @@ def test_two_trajectories():
 
 def test_map_agrees_with_single_points():
     chart = so.lyapunov_map(
-        CHAOTIC, [2.2, 2.6], parameter="p", values=np.array([0.3, 1.6]), periods=160, transient=100, tolerance=1e-9
+        CHAOTIC, (2.2, 2.6), "p", (0.3, 1.6), grid=(2, 2), periods=160, transient=100, tolerance=1e-9
     )
     assert chart.chaotic.tolist() == [[False, False], [False, True]]
     motion = shoot(CHAOTIC, so.integrate(CHAOTIC, omega=2.2, periods=1, transient=300, parameters={"p": 0.3}).end, 2.2,
                    values={"p": 0.3})  # fmt: skip
     assert chart.exponent[0, 0] == pytest.approx(np.log(np.abs(motion.multipliers[0])) / motion.period, abs=2e-3)
     alone = so.lyapunov_map(
-        CHAOTIC, [2.2, 2.6], parameter="p", values=np.array([0.3, 1.6]), periods=160, transient=100, tolerance=1e-9,
+        CHAOTIC, (2.2, 2.6), "p", (0.3, 1.6), grid=(2, 2), periods=160, transient=100, tolerance=1e-9,
         workers=1,
     )  # fmt: skip
     assert np.array_equal(chart.exponent, alone.exponent)
@@ -131,9 +133,9 @@ def test_mistakes(options, said):
 
 def test_mistakes_of_maps():
     for options, said in (
-        ({"omega": (2.0, 3.0), "parameter": "q", "values": (1.0, 2.0)}, "unknown parameter"),
-        ({"omega": (2.0, 3.0), "parameter": "p", "values": (1.0, 2.0), "counts": 5}, "counts"),
-        ({"omega": (2.0, 3.0), "parameter": "p", "values": (1.0, 2.0), "parameters": {"p": 1.0}}, "fixes p"),
+        ({"omega": (2.0, 3.0), "parameter": "q", "bounds": (1.0, 2.0)}, "no parameter"),
+        ({"omega": (2.0, 3.0), "parameter": "p", "bounds": (1.0, 2.0), "grid": 5}, "grid"),
+        ({"omega": (2.0, 3.0), "parameter": "p", "bounds": (1.0, 2.0), "parameters": {"p": 1.0}}, "fixes p"),
     ):
         with pytest.raises(InputError, match=said):
             so.lyapunov_map(CHAOTIC, **options)

@@ -16,7 +16,7 @@ def duffing():
 
 @pytest.fixture(scope="module")
 def both(duffing):
-    return so.stepped_sine(duffing, (0.8, 2.2), steps=14, direction="both", settle=120, measure=20)
+    return so.stepped_sine(duffing, (0.8, 2.2), values=15, direction=("up", "down"), transient=120, periods=20)
 
 
 def test_a_linear_oscillator_in_closed_form():
@@ -24,7 +24,7 @@ def test_a_linear_oscillator_in_closed_form():
     system = so.System(
         mass=2.0, damping=0.4, stiffness=3.0, loads=[so.HarmonicLoad(dof=0, amplitude=-0.7, phase=0.4)]
     )  # fmt: skip
-    test = so.stepped_sine(system, (0.5, 2.0), steps=5, settle=150, measure=4, harmonics=(1, 2))
+    test = so.stepped_sine(system, (0.5, 2.0), values=6, transient=150, periods=4, harmonics=(1, 2))
     gain = 0.7 / (3.0 - 2.0 * test.omega**2 + 0.4j * test.omega)
     np.testing.assert_allclose(test.harmonic(1), gain, rtol=1e-8)
     assert np.abs(test.harmonic(2)).max() < 1e-9
@@ -36,7 +36,7 @@ def test_sweeps_lie_on_stable_branches_and_jump_at_folds(duffing, both, duffing_
     lower, upper = sorted(b.omega for b in duffing_curve.bifurcations["LP"])
     for s, direction in enumerate(both.directions):
         for v, w in enumerate(both.omega):
-            orbit = so.periodic_orbit(duffing, w, state=both.ends[s, v])
+            orbit = so.periodic_orbit(duffing, w, start=both.ends[s, v])
             assert abs(both.response[s, v, 0]) == pytest.approx(abs(orbit.harmonic(1)), rel=1e-5)
             third = both.harmonic(3, 0, direction)[v]
             assert third == pytest.approx(orbit.harmonic(3), abs=1e-5 * abs(orbit.harmonic(1)))
@@ -48,7 +48,7 @@ def test_sweeps_lie_on_stable_branches_and_jump_at_folds(duffing, both, duffing_
 
 def test_noise_is_seeded_and_averages_out(duffing):
     quiet, loud, again, other = (
-        so.stepped_sine(duffing, np.array([0.8, 2.2]), settle=80, measure=100, noise=noise, seed=seed).harmonic(1)
+        so.stepped_sine(duffing, (0.8, 2.2), values=2, transient=80, periods=100, noise=noise, seed=seed).harmonic(1)
         for noise, seed in ((0.0, 0), (0.1, 1), (0.1, 1), (0.1, 2))
     )
     np.testing.assert_array_equal(loud, again)
@@ -61,8 +61,10 @@ def test_noise_is_seeded_and_averages_out(duffing):
 
 def test_a_tap_changes_the_motion(duffing):
     """On the way down the lower motion is held; a tap in the range of two motions leads to the upper one."""
-    test = so.stepped_sine(duffing, (1.2, 2.2), steps=5, direction="down", tap=(1.4, 0, -1.5), settle=150, measure=10)
-    plain = so.stepped_sine(duffing, (1.2, 2.2), steps=5, direction="down", settle=150, measure=10)
+    test = so.stepped_sine(
+        duffing, (1.2, 2.2), values=6, direction="down", tap=(1.4, 0, -1.5), transient=150, periods=10
+    )
+    plain = so.stepped_sine(duffing, (1.2, 2.2), values=6, direction="down", transient=150, periods=10)
     assert test.tapped[0] == pytest.approx(1.4)
     before = test.omega > 1.41
     np.testing.assert_allclose(test.amplitude()[before], plain.amplitude()[before], rtol=1e-9)
@@ -86,7 +88,7 @@ def test_interrupted(duffing):
         if share > 0.5:
             raise KeyboardInterrupt
 
-    test = so.stepped_sine(duffing, (0.8, 1.2), steps=5, settle=20, measure=6, progress=stop)
+    test = so.stepped_sine(duffing, (0.8, 1.2), values=6, transient=20, periods=6, progress=stop)
     assert not test.complete
     assert 0 < (test.period[0] >= 0).sum() < len(test.omega)
     assert len(test.to_dataframe()) == (test.period >= 0).sum()
@@ -96,17 +98,17 @@ def test_interrupted(duffing):
     ("arguments", "words"),
     [
         ({"omega": (1.0, 1.0)}, "two different"),
-        ({"omega": [0.0, 1.0]}, "positive frequencies"),
+        ({"omega": [0.0, 1.0]}, "frequencies are positive"),
         ({"direction": "upp"}, "did you mean 'up'|up"),
-        ({"settle": 0}, "settle"),
-        ({"measure": 0}, "measure"),
-        ({"harmonics": (0.3,), "measure": 4}, "whole number"),
+        ({"transient": 0}, "transient"),
+        ({"periods": 0}, "periods"),
+        ({"harmonics": (0.3,), "periods": 4}, "whole number"),
         ({"harmonics": (50,)}, "multiples of omega"),
         ({"noise": -1.0}, "noise"),
         ({"tap": (1.0, 0)}, "tap must be"),
         ({"tap": (9.0, 0, 1.0)}, "not within"),
         ({"tap": (1.0, 3, 1.0)}, "out of range"),
-        ({"state": [1.0]}, "state must be"),
+        ({"start": [1.0]}, "start must be"),
     ],
 )
 def test_wrong_input(duffing, arguments, words):
@@ -171,8 +173,8 @@ def test_a_file_that_is_not_there(tmp_path):
 def test_a_tap_leads_onto_the_published_isola():
     """At j = 0.5 sweeps pass the isola by; a tap at omega = 2.3 leads onto it, in both directions to its ends."""
     system = so.library.reference_oscillator(regularization=3000.0, j=0.5)
-    low = so.stepped_sine(system, (2.0, 2.9), steps=2, direction="down").ends[0, 0]
-    options = {"steps": 35, "direction": "both", "state": low}
+    low = so.stepped_sine(system, (2.0, 2.9), values=3, direction="down").ends[0, 0]
+    options = {"values": 36, "direction": ("up", "down"), "start": low}
     plain = so.stepped_sine(system, (2.0, 2.7), **options)
     assert set(plain.period.ravel()) <= {0, 1}
     tapped = so.stepped_sine(system, (2.0, 2.7), tap=(2.3, 0, 0.9), **options)
@@ -186,6 +188,6 @@ def test_a_tap_leads_onto_the_published_isola():
             assert (test.period[s] == 0).sum() <= 1  # behind a jump it may not be settled
             for v in np.flatnonzero(test.period[s]):
                 orbit = so.periodic_orbit(
-                    system, test.omega[v], state=test.ends[s, v], subharmonic=int(test.period[s, v])
+                    system, test.omega[v], start=test.ends[s, v], subharmonic=int(test.period[s, v])
                 )
                 assert abs(test.response[s, v, 0]) == pytest.approx(abs(orbit.harmonic(1)), rel=1e-3)

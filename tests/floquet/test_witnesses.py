@@ -149,7 +149,7 @@ def doubled(request):
     """A stable motion of two load periods between the period doublings of the reference oscillator, and by shooting."""
     system, omega, nu, harmonics = so.library.reference_oscillator(regularization=request.param), 3.0, 2, 50
     period = 2.0 * np.pi * nu / omega
-    settled = so.integrate(system, [0.1, 0.0], omega=omega, transient=120, periods=2).end
+    settled = so.integrate(system, start=[0.1, 0.0], omega=omega, transient=120, periods=2).end
     solution = shoot(system, settled, omega, periods=nu)
     samples = integrate(system, solution.state, [0.0, period], omega).at(period * np.arange(512) / 512)[0]
     c = np.fft.rfft(samples, axis=0)[: harmonics + 1] / 256

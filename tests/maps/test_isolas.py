@@ -494,7 +494,7 @@ def test_a_true_isola_of_unsymmetric_motions_stays():
 def test_what_hangs_on_an_isola_is_part_of_it():
     """The symmetric 3T isola at F = 200 has four pitchforks; the loops between them turn back there, it does not."""
     system = so.library.duffing(c=0.1).with_parameters(F=200.0)
-    start = so.periodic_orbit(system, 3.1987, state=[5.656, -25.978], subharmonic=3)
+    start = so.periodic_orbit(system, 3.1987, start=[5.656, -25.978], subharmonic=3)
     isola = so.continue_branch(start, "omega", (1.0, 5.0))
     assert isola.closed
     assert len(isola.bifurcations["BP"]) == 4

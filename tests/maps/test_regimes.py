@@ -92,7 +92,7 @@ def test_raster_and_regions_say_what_labels_say(folded):
 
 def test_time_integration_agrees(folded):
     exact = so.regime_map(duffing(), (0.9, 1.9), "F", (0.1, 0.4), depth=0, values=2)
-    checked = exact.check(points=12, seed=3, states=3, transient=100)
+    checked = exact.check(points=12, seed=3, starts=3, transient=100)
     assert checked.points == 12
     assert checked.rate == 1.0, checked
     assert checked.disagreements == []
@@ -110,7 +110,7 @@ def test_a_period_doubling_and_what_only_time_integration_knows(doubling, tmp_pa
     system = doubling.system.with_parameters({"j": 0.0283197})
     assert doubling.label(3.33828, 0.0283197).periods == (2,)
     (orbit,) = doubling.motions(3.33828, 0.0283197)
-    assert so.poincare_sections(system, orbit.start(), omega=3.33828, transient=300).attractor(0).period == 2
+    assert so.poincare_sections(system, start=orbit.start(), omega=3.33828, transient=300).attractor(0).period == 2
     checked = doubling.check(points=15, seed=1)
     assert {one.verdict for one in checked.landings} <= {"agrees", "unknown motion"}
     assert checked.rate > 0.7
@@ -154,7 +154,7 @@ def test_isola_and_cascade_of_one_slice():
         regime = found.label(omega, 0.23)
         assert (period, True) in regime.motions
         (orbit,) = (o for o in found.motions(omega, 0.23) if o.basis.nu == period)
-        settled = so.poincare_sections(system.with_parameters({"j": 0.23}), orbit.start(), omega=omega)
+        settled = so.poincare_sections(system.with_parameters({"j": 0.23}), start=orbit.start(), omega=omega)
         assert settled.attractor(0).period == period
     assert found.label(2.155, 0.23).beyond == ((8, True),)
     assert "8T or more on an isola" in str(found.label(2.155, 0.23))

@@ -29,7 +29,13 @@ def periods_in_time(system, name, points, transient):
     omega, values = np.array(points).T
     rest = np.zeros((len(points), 2 * system.n))
     sections = so.poincare_sections(
-        system, rest, omega=omega, parameters={name: values}, transient=transient, periods=24, period_tolerance=1e-4
+        system,
+        start=rest,
+        omega=omega,
+        parameters={name: values},
+        transient=transient,
+        periods=24,
+        period_tolerance=1e-4,
     )
     return sections.periods
 
@@ -44,5 +50,5 @@ def test_a_chain_of_ten_masses_that_meets_a_stop():
     assert min(labels.count((1,)), labels.count((2,))) > 10
     assert [(period,) for period in periods_in_time(chain, "gap", points, 200)] == labels
     # from any state, and beside the motions of the map: the very same motions
-    checked = regimes.check(points=4, seed=2, states=1, transient=200)
+    checked = regimes.check(points=4, seed=2, starts=1, transient=200)
     assert checked.agreeing == 1.0, checked

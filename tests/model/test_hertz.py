@@ -99,10 +99,10 @@ def test_the_witness_agrees(system, response):
     """Shooting, and the integrator of many trajectories, which has the law as code of its own."""
     assert so.verify(response.points[0]).agrees
     orbit = response.points[0].orbit
-    run = so.integrate(system, orbit.start(), omega=orbit.omega, periods=1)
+    run = so.integrate(system, start=orbit.start(), omega=orbit.omega, periods=1)
     assert run.displacement[-1, 0] == pytest.approx(orbit.displacement(0.0)[0], abs=1e-4)
     mirrored = so.System(1.0, C, 1.0, [so.HertzContact(0, K, -G, D, "left")], [so.HarmonicLoad(0, 0.5, phase="pi")])
-    other = so.integrate(mirrored, -orbit.start(), omega=orbit.omega, periods=1)
+    other = so.integrate(mirrored, start=-orbit.start(), omega=orbit.omega, periods=1)
     assert other.displacement == pytest.approx(-run.displacement, abs=1e-8)
 
 

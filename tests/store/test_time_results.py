@@ -66,21 +66,21 @@ def _basins():
 
 
 MAKERS = {
-    "trajectory": lambda: so.integrate(SYSTEM, [0.1, 0.0], omega=2.25, periods=3, steps_per_period=20),
+    "trajectory": lambda: so.integrate(SYSTEM, start=[0.1, 0.0], omega=2.25, periods=3, steps_per_period=20),
     "trajectory, two": lambda: so.integrate(_wide(), omega=1.1, periods=2, steps_per_period=20, parameters={"F": 0.4}),
     "sections": lambda: so.poincare_sections(
-        SYSTEM, [[0.1, 0.0], [0.5, 0.4], [3.0, 3.0]], omega=2.25, transient=20, periods=8,
+        SYSTEM, start=[[0.1, 0.0], [0.5, 0.4], [3.0, 3.0]], omega=2.25, transient=20, periods=8,
         parameters={"p": [0.5, 0.55, 0.6]},
     ),
     "sections, two": lambda: so.poincare_sections(_wide(), omega=1.1, transient=5, periods=6),
     "brute force": lambda: so.brute_force_diagram(
-        SYSTEM, (2.2, 2.4), count=4, start=("up", "rest"), states=[[0.5, 0.4]], transient=30, periods=9
+        SYSTEM, (2.2, 2.4), values=4, direction=("up", "anew"), start=[[0.0, 0.0], [0.5, 0.4]], transient=30, periods=9
     ),
     "brute force over p": lambda: so.brute_force_diagram(
-        SYSTEM, 2.25, parameter="p", values=(0.5, 0.6), count=3, start="down", transient=20, periods=6
+        SYSTEM, 2.25, parameter="p", bounds=(0.5, 0.6), values=3, direction="down", transient=20, periods=6
     ),
     "stepped sine": lambda: so.stepped_sine(
-        SYSTEM, (2.2, 2.4), steps=4, direction="both", settle=10, measure=8, tap=(2.3, 0, 0.9), noise=0.01
+        SYSTEM, (2.2, 2.4), values=5, direction=("up", "down"), transient=10, periods=8, tap=(2.3, 0, 0.9), noise=0.01
     ),
     "exponents": lambda: so.lyapunov_exponents(
         SYSTEM, omega=2.25, periods=40, transient=10, trajectories=3, parameters={"p": 0.6}
@@ -90,7 +90,7 @@ MAKERS = {
         method=so.TwoTrajectories(steps_per_period=(400, 500), offset=(1e-12, 1e-11), periods=120),
     ),
     "map": lambda: so.lyapunov_map(
-        SYSTEM, (2.2, 2.4), parameter="p", values=(0.5, 0.6), counts=(3, 2), transient=10, periods=40,
+        SYSTEM, (2.2, 2.4), parameter="p", bounds=(0.5, 0.6), grid=(3, 2), transient=10, periods=40,
         parameters={"j": 0.4},
     ),
     "basins": lambda: _basins(),
@@ -156,7 +156,9 @@ def test_what_is_loaded_goes_on(tmp_path):
     found = _basins()
     again = so.load(found.save(tmp_path / "basins.nc"))
     assert again.attractor_at(0.0, 0.0).name == found.attractor_at(0.0, 0.0).name
-    ends = so.integrate(again.system, again.attractors[0].state, omega=again.omega, periods=again.attractors[0].period)
+    ends = so.integrate(
+        again.system, start=again.attractors[0].state, omega=again.omega, periods=again.attractors[0].period
+    )
     assert np.allclose(ends.end, again.attractors[0].state, atol=1e-9)
 
 

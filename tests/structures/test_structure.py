@@ -461,7 +461,7 @@ def test_a_stop_that_is_never_reached_leaves_the_linear_response(structure, chai
         loads=[so.HarmonicLoad(dof=structure.dof(1042, "z"), amplitude=0.2)],
         damping=so.Rayleigh(0.05, 0.01),
     )
-    orbit = so.periodic_orbit(system, 1.3, state=np.zeros(16))
+    orbit = so.periodic_orbit(system, 1.3, start=np.zeros(16))
     c = 0.05 * chain.mass + 0.01 * chain.stiffness
     exact = np.linalg.solve(chain.stiffness - 1.3**2 * chain.mass + 1.3j * c, 0.2 * np.eye(8)[1])
     assert orbit.amplitude(1) == pytest.approx(abs(exact[1]), rel=1e-9)

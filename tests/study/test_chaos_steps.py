@@ -93,7 +93,7 @@ def test_files_and_journals_hold_all_of_it(ran, tmp_path):
         ("grid = [12, 10]\nbranches", "grid = [12, 0]\nbranches", "positive"),
         ('what = "states"', 'what = "states"\ncoordinates = ["x_0", "v_1"]', "v_0"),
         ("trajectories = 4", "trajectories = 4\ncount = 3", "at most 2"),
-        ("trajectories = 4", "trajectories = 4\nstate = [1.0]", "2 finite numbers"),
+        ("trajectories = 4", "trajectories = 4\nstart = [1.0]", "2 finite numbers"),
     ],
 )
 def test_mistakes(study_file, suboctave, change, to, said):

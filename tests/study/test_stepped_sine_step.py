@@ -18,10 +18,10 @@ STEP = """
 name = "rig"
 type = "stepped_sine"
 omega = [1.0, 1.6]
-steps = 3
-direction = "both"
-settle = 60
-measure = 12
+values = 4
+direction = ["up", "down"]
+transient = 60
+periods = 12
 tap = [1.4, 0, -1.5]
 noise = 0.001
 seed = 3
@@ -34,8 +34,8 @@ def test_as_by_a_script(study_file):
     outcome = run_study(study)
     table = outcome.finished[0].result
     test = so.stepped_sine(
-        study.system, (1.0, 1.6), steps=3, direction="both", settle=60, measure=12, tap=(1.4, 0, -1.5), noise=0.001,
-        seed=3,
+        study.system, (1.0, 1.6), values=4, direction=("up", "down"), transient=60, periods=12, tap=(1.4, 0, -1.5),
+        noise=0.001, seed=3,
     )  # fmt: skip
     np.testing.assert_array_equal(table["amplitude"], test.to_dataframe()["amplitude"])
     assert list(table["direction"]) == 4 * ["up"] + 4 * ["down"]
@@ -46,19 +46,18 @@ def test_as_by_a_script(study_file):
 @pytest.mark.parametrize(
     ("wrong", "right", "words"),
     [
-        ('direction = "up"', 'direction = "both"', "direction"),
+        ('direction = ["up", "down"]', 'direction = "sideways"', "direction"),
         ("tap = [1.4, 0, -1.5]", "tap = [1.4, 2, -1.5]", "out of range"),
         ("tap = [1.4, 0, -1.5]", "tap = [1.4, 0.5, -1.5]", "whole number"),
         ("tap = [1.4, 0, -1.5]", "tap = [3.0, 0, -1.5]", "not within"),
         ("omega = [1.0, 1.6]", "omega = [1.0, 1.0]", "two different"),
-        ("measure = 12", "measure = 7", "whole number"),
+        ("periods = 12", "periods = 7", "whole number"),
         ("noise = 0.001", "noise = -1.0", "noise"),
-        ("settle = 60", "setle = 60", "settle"),
+        ("transient = 60", "transsient = 60", "transient"),
+        ("transient = 60", "settle = 60", "settle"),
     ],
 )
 def test_mistakes(study_file, wrong, right, words):
-    text = ALONE.replace('direction = "both"', 'direction = "sideways"') if wrong.startswith("dir") else (
-        ALONE.replace(wrong, right)
-    )  # fmt: skip
+    assert wrong in ALONE
     with pytest.raises(InputError, match=words):
-        read_study(study_file(text))
+        read_study(study_file(ALONE.replace(wrong, right)))

@@ -21,7 +21,7 @@ def along(system, state, omega, periods=1):
     """States (1, N, 2n) of a trajectory at the instants of the pieces."""
     count = periods * PIECES
     times = np.arange(count + 1) * (2.0 * np.pi / omega / PIECES)
-    flow = so.integrate(system, state, omega=omega, periods=periods, steps_per_period=PIECES)
+    flow = so.integrate(system, start=state, omega=omega, periods=periods, steps_per_period=PIECES)
     assert np.allclose(flow.time, times)
     return np.hstack([flow.displacement, flow.velocity])[None, :count]
 

@@ -73,7 +73,7 @@ def test_a_trap_holds_what_it_catches():
     """States drawn from the neighbourhoods of a stable motion are at the motion at last; unstable ones have none."""
     system = so.library.duffing(c=0.1, alpha=1.0, F=0.3)
     for state, stable in (([-0.2, 0.0], True), ([1.5, 0.0], True)):
-        motion = shoot(system, so.integrate(system, state, omega=1.5, periods=1, transient=150).end, 1.5)
+        motion = shoot(system, so.integrate(system, start=state, omega=1.5, periods=1, transient=150).end, 1.5)
         assert motion.stable is stable
         sizes = np.array([1.0, 1.5]) * motion.amplitude
         (trap,) = traps_about(system, motion.state[None], 1.5, {}, sizes)

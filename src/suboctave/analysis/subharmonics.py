@@ -189,10 +189,10 @@ def periodic_orbit(
     system: System,
     omega: float,
     *,
-    state: Any,
+    start: Any,
     subharmonic: int = 1,
     harmonics: Harmonics = "adaptive",
-    settle: int = 0,
+    transient: int = 0,
     newton: NewtonOptions | None = None,
     seconds: Positive | None = None,
 ) -> PeriodicOrbit:
@@ -202,11 +202,11 @@ def periodic_orbit(
     ----------
     omega
         Circular frequency of the load.
-    state
+    start
         Displacements and velocities at t = 0, shape (2 n,).
     subharmonic
         Period of the motion in periods of the load; one that repeats earlier is returned with its own period.
-    settle
+    transient
         Periods of the motion that are integrated in time before, to come closer to an attracting one.
     seconds
         Time limit, after which a TimeLimitError is raised.
@@ -218,13 +218,13 @@ def periodic_orbit(
     """
     order = 1 if subharmonic == 1 else check_order(subharmonic)
     omega = check_omega(omega)
-    settle = check_count("settle", settle, 0)
+    transient = check_count("transient", transient, 0)
     check_system(system, (omega,))
-    given = start_state(system, state)
+    given = start_state(system, start)
     curve = make_curve(system, "omega", omega, omega, harmonics, order, None)
     with one_thread():
-        if settle:
-            end = settle * order * 2.0 * np.pi / omega
+        if transient:
+            end = transient * order * 2.0 * np.pi / omega
             moving = system.viscous_equivalent()
             trajectory = integrate(moving, given, np.array([0.0, end]), omega, moving.parameters, rtol=1e-8)
             given = np.concatenate((trajectory.x[-1], trajectory.v[-1]))
@@ -233,7 +233,7 @@ def periodic_orbit(
     return (
         orbit
         if own == order
-        else periodic_orbit(system, omega, state=orbit.start(), subharmonic=own, harmonics=harmonics, newton=newton)
+        else periodic_orbit(system, omega, start=orbit.start(), subharmonic=own, harmonics=harmonics, newton=newton)
     )
 
 

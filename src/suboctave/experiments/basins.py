@@ -210,12 +210,12 @@ class Basins(TimeResult):
 @of_structures
 def basins(
     system: System,
-    *,
     omega: float,
+    *,
     box: tuple[tuple[float, float], tuple[float, float]],
     grid: tuple[Count, Count] = (200, 200),
     plane: tuple[str | int, str | int] | None = None,
-    rest: Any = None,
+    start: Any = None,
     attractors: Any = None,
     parameters: Mapping[str, float] | None = None,
     periods: Count = 500,
@@ -230,9 +230,9 @@ def basins(
         Of the load; other values of some parameters, by name.
     box
         `((from, to), (from, to))` of the two coordinates; `grid` states along each, the ends among them.
-    plane, rest
+    plane, start
         The two coordinates: names `"x_0"`, `"v_2"` (of displacements and velocities) or numbers in the state (2n,);
-        default displacement and velocity of the observed degree of freedom. All others are as in `rest`, (2n,) or a
+        default displacement and velocity of the observed degree of freedom. All others are as in `start`, (2n,) or a
         motion, default zero.
     attractors
         Motions (of harmonic balance, of shooting, found in time), branches or diagrams of which the stable motions at
@@ -255,7 +255,7 @@ def basins(
     names, the others follow as a force there deflects them. Its neighbourhoods are a hundredth of the motion and not
     examined: what was followed to the end says how far to trust them.
     """
-    state, values = start_state(system, rest), system.read_values(parameters)
+    state, values = start_state(system, start), system.read_values(parameters)
     check_omega(omega)
     how = checked_integration(system, options, tolerance=1e-8)
     columns = check_plane(system, plane, how.observe)

@@ -1,13 +1,13 @@
 """`brute_force_diagram`: what trajectories settle on while a parameter is varied; it knows of no branch.
 
-The state is carried on from value to value, upwards and downwards, or every value begins anew, from rest or from
+The state is carried on from value to value, upwards and downwards, or every value begins anew, at rest or at
 states that are given. Only attracting motions are seen, and only those whose basins are met; none of
 these is left out.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, Any, Unpack
@@ -28,12 +28,12 @@ from suboctave.experiments.common import (
     checked_integration,
     of_structures,
     starting_states,
-    varied_grid,
 )
+from suboctave.experiments.grids import checked_directions, varied_grid
 from suboctave.experiments.poincare import Attractor, attractor_of, observed_in, recovered_attractor
 from suboctave.interruption import Interruption
 from suboctave.model.elements.base import Array
-from suboctave.model.inputs import start_state, timed
+from suboctave.model.inputs import timed
 from suboctave.model.projected import coordinates_of
 from suboctave.model.system import System
 from suboctave.options import with_options
@@ -42,7 +42,7 @@ from suboctave.store.layout import parameter_column
 from suboctave.timedomain.flow import Flow, Motions, check_extent
 
 _CARRIED = ("up", "down")
-_STARTS = (*_CARRIED, "rest")
+_DIRECTIONS = (*_CARRIED, "anew")
 
 
 @checked(result=True)
@@ -55,7 +55,7 @@ class BruteForceDiagram(TimeResult):
     name, values
         What was varied ("omega" or a parameter), and its values (V,), increasing.
     starts
-        S of "up", "down", "rest", "state 0", "state 1", ...
+        S of "up", "down", "anew"; from several starts "up 0", "up 1", ...
     points
         (S, V, P, 2n): states at phase 0 of the load after the transient, angles within half a turn; NaN where nothing
         was computed.
@@ -160,13 +160,12 @@ class BruteForceDiagram(TimeResult):
 def brute_force_diagram(
     system: System,
     omega: Any,
-    *,
     parameter: str | None = None,
-    values: Any = None,
-    count: Count = 200,
-    start: str | Sequence[str] = ("up", "down"),
-    state: Any = None,
-    states: Any = None,
+    bounds: tuple[float, float] | None = None,
+    *,
+    values: int | Sequence[float] = 200,
+    direction: str | Sequence[str] = ("up", "down"),
+    start: Any = None,
     transient: Index = 200,
     periods: Count = 60,
     **options: Unpack[SectionOptions],
@@ -176,25 +175,26 @@ def brute_force_diagram(
     Parameters
     ----------
     omega
-        The frequencies: `(from, to)`, of which `count` are taken, or all of an array. With `parameter`, one number.
-    parameter, values
-        A parameter that is varied instead, and its range `(from, to)` or its values.
+        The range of frequencies `(from, to)`. With `parameter`, one frequency.
+    parameter, bounds
+        A parameter that is varied instead, and its range `(from, to)`.
+    values
+        How many values are taken, evenly spread over the range; or these values.
+    direction
+        "up", "down": the state is carried on through increasing or decreasing values. "anew": every value begins at
+        `start`. Several of them in a sequence.
     start
-        "up", "down": the state is carried on through increasing or decreasing values. "rest": every value begins at
-        rest. Several of them in a sequence.
-    state
-        Where "up" and "down" begin, (2n,), a periodic motion or an attractor; default rest.
-    states
-        Further states (k, 2n) from which every value begins anew: they find motions that coexist.
+        Where all of them begin: (2n,), a periodic motion or an attractor; default rest. From several, (k, 2n) or
+        a list, each direction is followed: they find motions that coexist.
     transient, periods
         Periods of the load that are left out at every value, and those that are kept. A motion of period nT is
         recognised if `periods` is at least 3 n.
     """
-    first = start_state(system, state)
-    name, at, grid = varied_grid(system, omega, parameter, values, count)
-    fresh, names = starting_states(system, states), _starts(start)
+    begin, directions = starting_states(system, start), checked_directions(direction, _DIRECTIONS)
+    name, at, grid = varied_grid(system, omega, parameter, bounds, values)
     how = checked_integration(system, options)
-    labels = (*names, *(f"state {i}" for i in range(len(fresh))))
+    numbers = [f" {i}" for i in range(len(begin))] if len(begin) > 1 else [""]
+    labels = tuple(f"{one}{number}" for one in directions for number in numbers)
     trajectories = len(labels) * len(grid)
     check_extent(trajectories, transient + periods, trajectories * periods * 2 * system.n)
     points, largest = (np.full((len(labels), len(grid), periods, size), np.nan) for size in (2 * system.n, system.n))
@@ -205,7 +205,7 @@ def brute_force_diagram(
     run = _Run(diagram, periods, how)
     with reporting(options.get("progress"), "brute force") as report:
         try:
-            diagram.interruption = run.go(first, fresh, report)
+            diagram.interruption = run.go(np.tile(begin, (len(directions), 1)), report)
         except KeyboardInterrupt as cause:
             diagram.interruption = Interruption.of(cause)
     diagram.complete = diagram.interruption is None
@@ -220,25 +220,24 @@ class _Run:
     periods: int
     how: Integration
 
-    def go(self, first: Array, fresh: Array, report: Report | None) -> Interruption | None:
-        """States that are carried on from `first` (2n,), then every value anew from rest and from `fresh` (k, 2n)."""
+    def go(self, begin: Array, report: Report | None) -> Interruption | None:
+        """From states `begin` (S, 2n): those that are carried on, then those from which every value begins anew."""
         starts = self.diagram.starts
-        carried = [i for i, label in enumerate(starts) if label in _CARRIED]
-        anew = [i for i, label in enumerate(starts) if label not in _CARRIED]
+        carried = [i for i, label in enumerate(starts) if label.startswith(_CARRIED)]
+        anew = [i for i in range(len(starts)) if i not in carried]
         share = len(carried) / len(starts)
         if carried:
-            self._carry(carried, first, _share(report, 0.0, share))
+            self._carry(carried, begin[carried], _share(report, 0.0, share))
         if not anew:
             return None
-        begin = np.vstack([np.zeros((1, len(first))), fresh]) if "rest" in starts else fresh
-        return self._begin_anew(anew, begin, _share(report, share, 1.0))
+        return self._begin_anew(anew, begin[anew], _share(report, share, 1.0))
 
     def _carry(self, rows: list[int], first: Array, report: Report | None) -> None:
-        """Carry states through the values, all directions side by side."""
+        """Carry states `first` (len(rows), 2n) through the values, all side by side."""
         d, count = self.diagram, len(self.diagram.values)
-        flow, states = self._flow(FEW), np.repeat(first[None], len(rows), axis=0)
+        flow, states = self._flow(FEW), first
         for step in range(count):
-            columns = [step if d.starts[row] == "up" else count - 1 - step for row in rows]
+            columns = [step if d.starts[row].startswith("up") else count - 1 - step for row in rows]
             motions = self._over(flow, states, d.values[columns], workers=1).whole()
             d.points[rows, columns], d.largest[rows, columns] = motions.states, motions.peaks
             if d.turns is not None:
@@ -278,11 +277,3 @@ def _share(report: Report | None, begin: float, end: float) -> Report | None:
     if report is None:
         return None
     return lambda share, where: report(begin + (end - begin) * share, where)
-
-
-def _starts(start: str | Sequence[str]) -> list[str]:
-    listed = [start] if isinstance(start, str) else list(start) if isinstance(start, Iterable) else [start]
-    wrong = next((f"{one!r}{suggest(str(one), _STARTS)}" for one in listed if one not in _STARTS), None)
-    if wrong or not listed:
-        raise InputError(f"start is one of {', '.join(_STARTS)}, or several of them, not {wrong or 'none'}")
-    return list(dict.fromkeys(listed))

@@ -35,8 +35,6 @@ from suboctave.model.elements.coupled import as_coupled
 from suboctave.model.inputs import (
     check_count,
     check_is_system,
-    check_parameter,
-    check_range,
     observed_dof,
     start_state,
 )
@@ -149,14 +147,12 @@ def steps_of(method: str, given: int | None) -> int:
 
 
 # ------------------------------------------------------------------------------------------------------------ starts
-def starting_states(system: System, states: Any) -> Array:
-    """States (k, 2n), none for None."""
-    if states is None:
-        return np.zeros((0, 2 * system.n))
-    array = np.atleast_2d(numbers_of(states))
-    if array.ndim != 2 or array.shape[1] != 2 * system.n or not np.isfinite(array).all():
-        raise InputError(f"states must be finite numbers of shape (k, {2 * system.n}), got {array.shape}")
-    return array
+def starting_states(system: System, start: Any) -> Array:
+    """States (k, 2n) of one start, or of several: rest for None, states, or motions, whose state at t = 0 is taken."""
+    several = isinstance(start, list | tuple) and len(start) and not all(is_number(one) for one in start)
+    if several or (isinstance(start, np.ndarray) and start.ndim == 2 and len(start)):
+        return np.stack([start_state(system, one) for one in start])
+    return start_state(system, start)[None]
 
 
 def coordinates(system: System) -> list[str]:
@@ -207,13 +203,10 @@ def of_structures(verb: Callable[Arguments, Result]) -> Callable[Arguments, Resu
         if not isinstance(small, ProjectedSystem):
             return verb(*bound.args, **bound.kwargs)
         given["system"], lost = small, 0.0
-        for name in ("state", "states", "rest"):
-            if given.get(name) is not None:
-                states = given[name]
-                several = name == "states" and isinstance(states, list | tuple | np.ndarray) and np.ndim(states) == 2
-                states = starting_states(system, states) if several else start_state(system, states)
-                lost = max([lost, *(small.energy_outside(one) for one in np.atleast_2d(states))])
-                given[name] = small.reduced(states)
+        if given.get("start") is not None:
+            states = starting_states(system, given["start"])
+            lost = max(small.energy_outside(one) for one in states)
+            given["start"] = small.reduced(states if len(states) > 1 else states[0])
         if options.get("observe") is not None:
             options["observe"] = small.coordinate(watched[0])
         if given.get("plane") is not None:
@@ -254,8 +247,8 @@ def _watched(system: System, given: Mapping[str, Any], options: Mapping[str, Any
 def _varied(system: System, given: Mapping[str, Any]) -> dict[str, list[float]]:
     """Ends and middle of the values that parameters have, by name."""
     varied = dict(given["parameters"]) if isinstance(given.get("parameters"), Mapping) else {}
-    if given.get("values") is not None and isinstance(given.get("parameter"), str):
-        varied[given["parameter"]] = given["values"]
+    if given.get("bounds") is not None and isinstance(given.get("parameter"), str):
+        varied[given["parameter"]] = given["bounds"]
     arrays = {name: numbers_of(values) for name, values in varied.items() if name in system.parameters}
     return {
         name: sorted({float(a.min()), 0.5 * float(a.min() + a.max()), float(a.max())})
@@ -286,42 +279,6 @@ def check_plane(system: System, plane: Any, observe: int) -> tuple[int, int]:
     if read[0] == read[1]:
         raise InputError(f"plane={plane!r} names one coordinate twice")
     return read[0], read[1]
-
-
-# ------------------------------------------------------------------------------------------------------------- grids
-def checked_range(name: str, given: Any, count: int, positive: bool) -> Array:
-    """Increasing values: `count` of a range `(from, to)`, or all of an array."""
-    if isinstance(given, tuple) and len(given) == 2:
-        first, last = check_range(name, given, positive)
-        return np.linspace(min(first, last), max(first, last), count)
-    array = numbers_of(given)
-    if array.ndim != 1 or not array.size or not np.isfinite(array).all() or (positive and (array <= 0.0).any()):
-        what = "positive frequencies" if positive else "finite values"
-        raise InputError(f"{name}: give a range (from, to), or an array of {what}")
-    return np.unique(array)
-
-
-def varied_grid(system: System, omega: Any, parameter: str | None, values: Any, count: int) -> tuple[str, float, Array]:
-    """What is varied, the frequency if that is not, and the increasing values."""
-    count = check_count("count", count)
-    if parameter is None or parameter == "omega":
-        if values is not None and parameter is None:
-            raise InputError("values= are those of a parameter: name it with parameter=")
-        if is_number(omega):
-            raise InputError("omega must be a range (from, to) or several values; or name a parameter to vary")
-        return "omega", 0.0, checked_range("omega", omega, count, True)
-    check_parameter(system, parameter)
-    if not (is_number(omega) and omega > 0.0):
-        raise InputError(f"omega must be a positive number while {parameter} is varied, not {omega!r}")
-    if values is None:
-        raise InputError(f"give the range or the values of {parameter}: values=(from, to)")
-    grid = checked_range(parameter, values, count, False)
-    for end in (grid[0], grid[-1]):
-        try:
-            system.with_parameters({parameter: float(end)})
-        except InputError as failure:
-            raise InputError(f"{parameter}={end:g}: {failure}") from None
-    return parameter, float(omega), grid
 
 
 # ------------------------------------------------------------------------------------------------------------ forces

@@ -148,12 +148,12 @@ class LyapunovExponents(TimeResult):
 @overload
 def lyapunov_exponents(
     system: System,
-    state: Any = None,
-    *,
     omega: Positive,
+    *,
+    start: Any = None,
     parameters: Mapping[str, float] | None = None,
-    periods: Count = 1000,
     transient: Index = 300,
+    periods: Count = 1000,
     count: Count | None = None,
     trajectories: Count = 16,
     method: Literal["variational"] = "variational",
@@ -165,9 +165,9 @@ def lyapunov_exponents(
 @overload
 def lyapunov_exponents(
     system: System,
-    state: Any = None,
-    *,
     omega: Positive,
+    *,
+    start: Any = None,
     parameters: Mapping[str, float] | None = None,
     method: Literal["two_trajectories"] | TwoTrajectories,
     **options: Unpack[ParallelOptions],
@@ -179,12 +179,12 @@ def lyapunov_exponents(
 @of_structures
 def lyapunov_exponents(
     system: System,
-    state: Any = None,
-    *,
     omega: Positive,
+    *,
+    start: Any = None,
     parameters: Mapping[str, float] | None = None,
-    periods: Count = 1000,
     transient: Index = 300,
+    periods: Count = 1000,
     count: Count | None = None,
     trajectories: Count = 16,
     method: str | TwoTrajectories = "variational",
@@ -195,13 +195,13 @@ def lyapunov_exponents(
 
     Parameters
     ----------
-    state
-        Where the trajectory begins, (2n,), a periodic motion or an attractor; None for rest.
     omega, parameters
         Of the load; other values of some parameters, by name.
-    periods, transient
-        Periods of the load over which each trajectory is averaged, after some that are left out (twice: once to reach
-        the attractor, once for trajectories and tangent vectors to forget where they began).
+    start
+        Where the trajectory begins, (2n,), a periodic motion or an attractor; None for rest.
+    transient, periods
+        Periods of the load that are left out (twice: once to reach the attractor, once for trajectories and tangent
+        vectors to forget where they began), and those over which each trajectory is averaged.
     count
         How many exponents, the largest first; default all 2n.
     trajectories
@@ -225,7 +225,7 @@ def lyapunov_exponents(
     ConvergenceError
         If a motion leaves the range of numbers.
     """
-    first = start_state(system, state)
+    first = start_state(system, start)
     values, omega = system.read_values(parameters), check_omega(omega)
     if method == "two_trajectories":
         method = TwoTrajectories()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Protocol, Unpack, runtime_checkable
 
@@ -16,13 +16,12 @@ from suboctave.experiments.common import (
     ParallelOptions,
     TimeResult,
     check_continuous,
-    checked_range,
     of_structures,
-    varied_grid,
 )
+from suboctave.experiments.grids import checked_grid, varied_grid
 from suboctave.experiments.lyapunov import over_stretches, smooth_weights
 from suboctave.model.elements.base import Array
-from suboctave.model.inputs import check_parameter, start_state, timed
+from suboctave.model.inputs import start_state, timed
 from suboctave.model.system import System
 from suboctave.options import with_options
 from suboctave.progress import reporting
@@ -121,12 +120,12 @@ class LyapunovMap(TimeResult):
 @of_structures
 def lyapunov_map(
     system: System,
-    omega: Any,
-    *,
+    omega: tuple[float, float],
     parameter: str,
-    values: Any,
-    counts: tuple[Count, Count] = (60, 40),
-    state: Any = None,
+    bounds: tuple[float, float],
+    *,
+    grid: tuple[int | Sequence[float], int | Sequence[float]] = (60, 40),
+    start: Any = None,
     parameters: Mapping[str, float] | None = None,
     transient: Index = 200,
     periods: Count = 400,
@@ -137,11 +136,13 @@ def lyapunov_map(
 
     Parameters
     ----------
-    omega, values
-        Frequencies and values of `parameter`: ranges `(from, to)`, of which `counts` are taken, or all of an array.
-    counts
-        Of frequencies and of values.
-    state
+    omega
+        Range of frequencies `(from, to)`.
+    parameter, bounds
+        The parameter and its range `(from, to)`.
+    grid
+        How many frequencies and how many values of the parameter, evenly spread over the ranges; or these themselves.
+    start
         Where every trajectory begins, (2n,), default rest. Where motions coexist, one of them is seen.
     transient, periods
         Periods of the load that are left out, and those averaged over.
@@ -150,18 +151,18 @@ def lyapunov_map(
     parameters
         Other values of some parameters, by name.
     """
-    first = start_state(system, state)
-    check_parameter(system, parameter)
+    first = start_state(system, start)
+    system.check_parameter(parameter)
     fixed = system.read_values(parameters)
     if parameter in fixed:
         raise InputError(f"parameters= fixes {parameter}, which is to be varied")
     if periods < 2 * _STRETCHES:
         raise InputError(f"periods={periods}: take at least {2 * _STRETCHES}, for the standard errors")
-    cells = counts[0] * counts[1]
-    check_extent(cells, transient + periods, 2 * cells * periods * system.n)
-    frequencies = checked_range("omega", omega, counts[0], True)
     at = system.with_parameters(fixed) if fixed else system
-    _, _, column = varied_grid(at, float(frequencies[0]), parameter, values, counts[1])
+    frequencies = checked_grid("omega", omega, grid[0], "grid[0]")
+    _, _, column = varied_grid(at, float(frequencies[0]), parameter, bounds, grid[1])
+    cells = len(frequencies) * len(column)
+    check_extent(cells, transient + periods, 2 * cells * periods * system.n)
     check_continuous(at, first, float(frequencies[0]), {parameter: float(column[0])})
     flow = Flow(system, "accurate", tolerance=tolerance, tangents=1)
     shape = len(column), len(frequencies)

@@ -19,10 +19,11 @@ from suboctave.experiments.common import (
     TimeResult,
     checked_integration,
     of_structures,
+    starting_states,
     watched_states,
 )
 from suboctave.model.elements.base import Array
-from suboctave.model.inputs import start_state, timed
+from suboctave.model.inputs import timed
 from suboctave.model.projected import ProjectedSystem, coordinates_of
 from suboctave.model.system import System
 from suboctave.options import with_options
@@ -164,9 +165,9 @@ class PoincareSections(TimeResult):
 @of_structures
 def poincare_sections(
     system: System,
-    states: Any = None,
-    *,
     omega: ArrayLike,
+    *,
+    start: Any = None,
     parameters: Mapping[str, ArrayLike] | None = None,
     transient: Index = 300,
     periods: Count = 60,
@@ -176,15 +177,16 @@ def poincare_sections(
 
     Parameters
     ----------
-    states
-        (B, 2n) or (2n,): displacements, then velocities, at phase 0 of the load; None for rest.
     omega, parameters
         A number, or (B,) with one for each trajectory; parameters by name.
+    start
+        (B, 2n) or (2n,): displacements, then velocities, at phase 0 of the load; one motion or a list of them; None for
+        rest.
     transient, periods
         Periods of the load that are left out, and those that are kept.
     """
-    if states is None or not isinstance(states, list | tuple | np.ndarray):
-        states = start_state(system, states)
+    states = starting_states(system, start)
+    states = states if len(states) > 1 else states[0]
     how = checked_integration(system, options)
     flow = Flow(system, how.method, 1, how.steps, how.tolerance)
     with reporting(options.get("progress"), "Poincaré sections") as report:

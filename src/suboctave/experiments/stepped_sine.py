@@ -32,9 +32,9 @@ from suboctave.experiments.common import (
     RecognitionOptions,
     TimeResult,
     checked_integration,
-    checked_range,
     of_structures,
 )
+from suboctave.experiments.grids import checked_directions, checked_grid
 from suboctave.experiments.poincare import attractor_of
 from suboctave.interruption import Interruption
 from suboctave.model.elements.base import Array
@@ -45,7 +45,7 @@ from suboctave.progress import Report, reporting
 from suboctave.projection import COMPLETE
 from suboctave.timedomain.flow import Flow, check_extent
 
-_DIRECTIONS = ("up", "down", "both")
+_DIRECTIONS = ("up", "down")
 _SAMPLES = 128
 
 
@@ -54,13 +54,13 @@ _SAMPLES = 128
 @of_structures
 def stepped_sine(
     system: System,
-    omega: Any,
+    omega: tuple[float, float],
     *,
-    steps: int = 200,
-    direction: str = "up",
-    settle: int = 200,
-    measure: int = 60,
-    state: Any = None,
+    values: int | Sequence[float] = 201,
+    direction: str | Sequence[str] = "up",
+    start: Any = None,
+    transient: int = 200,
+    periods: int = 60,
     tap: tuple[float, int, float] | None = None,
     harmonics: Sequence[float] = (0, 0.5, 1, 2, 3),
     noise: float = 0.0,
@@ -72,19 +72,21 @@ def stepped_sine(
     Parameters
     ----------
     omega
-        `(from, to)`, in `steps` equal steps; or all of an array. The order is irrelevant.
+        The range of frequencies `(from, to)`; the order is irrelevant.
+    values
+        How many frequencies, evenly spread over the range; or these frequencies.
     direction
-        "up", "down", or "both": two tests, each from `state`.
-    settle, measure
-        Periods of the load at each step before, and over which, is measured. Sub-harmonic motions need a `measure` that
-        their period divides (60: up to 6T, and 10T).
-    state
+        "up", "down", or both in a sequence: two tests, each from `start`.
+    start
         Where each test begins, (2n,), a periodic motion or an attractor; default rest.
+    transient, periods
+        Periods of the load at each frequency that are left out, and those that are measured. Sub-harmonic motions need
+        `periods` that their period divides (60: up to 6T, and 10T).
     tap
         `(omega, dof, velocity)`: when a test arrives at or first passes this frequency, the velocity of a degree of
         freedom is changed by so much, at phase 0 of the load and after settling. It may lead to another motion.
     harmonics
-        Multiples of omega whose components are measured; `measure` times each must be whole. The fundamental always is.
+        Multiples of omega whose components are measured; `periods` times each must be whole. The fundamental always is.
     noise, seed
         Standard deviation of white noise on the samples of the response, in its unit, and the seed of the generator.
 
@@ -96,13 +98,15 @@ def stepped_sine(
         If the motion leaves the range of numbers.
     """
     how = checked_integration(system, options)
-    test = _Test(system, how, omega, steps, direction, settle, measure, state, tap, harmonics, noise, seed, system.n)
+    test = _Test(
+        system, how, omega, values, direction, start, transient, periods, tap, harmonics, noise, seed, system.n
+    )
     shape, n = (len(test.directions), len(test.grid)), system.n
     out = SteppedSine(
         test.grid, test.directions, test.multiples, np.full((*shape, len(test.multiples), n), np.nan, dtype=complex),
         np.full((*shape, n), np.nan, dtype=complex), np.full((*shape, n), np.nan), np.full(shape, -1),
         np.full((*shape, 2 * n), np.nan), np.full(shape[0], np.nan), True,
-        test.settle, test.measure, float(noise), how.observe, system,
+        test.transient, test.periods, float(noise), how.observe, system,
     )  # fmt: skip
     with reporting(options.get("progress"), "stepped sine") as report:
         try:
@@ -128,11 +132,11 @@ class _Test:
     system: System
     how: Integration
     omega: Any
-    steps: int
-    direction: str
-    settle: int
-    measure: int
-    state: Any
+    values: int | Sequence[float]
+    direction: str | Sequence[str]
+    start: Any
+    transient: int
+    periods: int
     tap: Any
     harmonics: Sequence[float]
     noise: float
@@ -140,17 +144,11 @@ class _Test:
     coordinates: int
 
     def __post_init__(self) -> None:
-        self.start = start_state(self.system, self.state)
-        # a range in so many steps has one more frequency
-        is_range = isinstance(self.omega, tuple) and len(self.omega) == 2
-        self.grid = checked_range("omega", self.omega, check_count("steps", self.steps) + 1 if is_range else 0, True)
-        if self.direction not in _DIRECTIONS:
-            raise InputError(
-                f"direction={self.direction!r}: up, down or both{suggest(str(self.direction), _DIRECTIONS)}"
-            )
-        self.directions = ("up", "down") if self.direction == "both" else (self.direction,)
-        self.settle, self.measure = check_count("settle", self.settle), check_count("measure", self.measure)
-        self.multiples = _multiples(self.harmonics, self.measure)
+        self.begin = start_state(self.system, self.start)
+        self.grid = checked_grid("omega", self.omega, self.values)
+        self.directions = checked_directions(self.direction, _DIRECTIONS)
+        self.transient, self.periods = check_count("transient", self.transient), check_count("periods", self.periods)
+        self.multiples = _multiples(self.harmonics, self.periods)
         if not (is_number(self.noise) and self.noise >= 0.0):
             raise InputError(
                 f"noise must be a standard deviation in the unit of the response, 0 or more, not {self.noise!r}"
@@ -161,7 +159,7 @@ class _Test:
             raise InputError(f"seed must be a whole number, 0 or more, not {shortened(self.seed)}") from None
         _loads(self.system, float(self.grid[0]))
         tests, size = len(self.grid) * len(self.directions), 2 * self.coordinates
-        check_extent(tests, self.settle + self.measure, tests * size * (len(self.multiples) + 3))
+        check_extent(tests, self.transient + self.periods, tests * size * (len(self.multiples) + 3))
         self.tapped = _tap(self.system, self.tap, self.grid)
 
     def run(self, out: SteppedSine, report: Report | None) -> None:
@@ -171,7 +169,7 @@ class _Test:
             Flow(self.system, "accurate", samples, tolerance=self.how.tolerance, lanes=FEW) for samples in (1, _SAMPLES)
         )
         up = np.array([direction == "up" for direction in self.directions])
-        states = np.repeat(self.start[None], len(up), axis=0)
+        states = np.repeat(self.begin[None], len(up), axis=0)
         for step in range(count):
             columns = np.where(up, step, count - 1 - step)
             w = self.grid[columns]
@@ -180,16 +178,16 @@ class _Test:
                 now = np.where(up, w >= at, w <= at) & np.isnan(out.tapped)
                 if now.any():
                     states[now] = (
-                        settling.over(states[now], w[now], self.settle, skip=self.settle, workers=1).checked().end
+                        settling.over(states[now], w[now], self.transient, skip=self.transient, workers=1).checked().end
                     )
                     states[now, n + dof] += change
                     out.tapped[now] = w[now]
-            states = settling.over(states, w, self.settle, skip=self.settle, workers=1).checked().end
-            motions = measured.over(states, w, self.measure, measure=True, workers=1).checked()
+            states = settling.over(states, w, self.transient, skip=self.transient, workers=1).checked().end
+            motions = measured.over(states, w, self.periods, measure=True, workers=1).checked()
             states = motions.end.copy()
             for s, v in enumerate(columns):
                 x, peaks = motions.states[s], motions.peaks[s]
-                largest = peaks.reshape(self.measure, -1, n).max(axis=1)
+                largest = peaks.reshape(self.periods, -1, n).max(axis=1)
                 settled = attractor_of(
                     self.system, x[_SAMPLES - 1 :: _SAMPLES], largest, float(w[s]), self.system.parameters,
                     self.how.period_tolerance, self.how.observe,
@@ -214,8 +212,8 @@ class _Test:
         phase = 2.0 * np.pi * turn
         p = np.real(load * np.exp(1j * phase))
         carrier = np.exp(-1j * phase)
-        per_period = (2.0 / _SAMPLES) * (carrier[:, None] * x).reshape(self.measure, _SAMPLES, -1).sum(axis=1)
-        loads = (2.0 / _SAMPLES) * (carrier * p).reshape(self.measure, _SAMPLES).sum(axis=1)
+        per_period = (2.0 / _SAMPLES) * (carrier[:, None] * x).reshape(self.periods, _SAMPLES, -1).sum(axis=1)
+        loads = (2.0 / _SAMPLES) * (carrier * p).reshape(self.periods, _SAMPLES).sum(axis=1)
         cross = np.sum(per_period * np.conj(loads)[:, None], axis=0)
         return components, abs(load) * cross / np.sum(np.abs(loads) ** 2)
 
@@ -233,17 +231,17 @@ def _loads(system: System, omega: float) -> complex:
     )
 
 
-def _multiples(harmonics: Sequence[float], measure: int) -> Array:
+def _multiples(harmonics: Sequence[float], periods: int) -> Array:
     try:
         array = np.atleast_1d(np.asarray(list(harmonics), dtype=float))
     except (TypeError, ValueError, OverflowError):
         array = np.array([np.nan])
     if not array.size or not np.isfinite(array).all() or (array < 0.0).any() or (array >= _SAMPLES / 4).any():
         raise InputError(f"harmonics must be multiples of omega from 0 to {_SAMPLES // 4 - 1}, not {harmonics!r}")
-    whole = array * measure
+    whole = array * periods
     if (np.abs(whole - whole.round()) > 1e-9).any():
         raise InputError(
-            f"harmonics={harmonics!r}: {measure} measured periods hold no whole number of each; change measure"
+            f"harmonics={harmonics!r}: {periods} measured periods hold no whole number of each; change periods"
         )
     return np.unique(np.append(array, 1.0))
 
@@ -303,8 +301,8 @@ class SteppedSine(TimeResult):
     ends: Annotated[Array, On("direction", "omega", "state")]
     tapped: Annotated[Array, On("direction")]
     complete: bool
-    settle: int
-    measure: int
+    transient: int
+    periods: int
     noise: float
     observed: int
     system: System

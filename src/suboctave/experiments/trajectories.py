@@ -104,11 +104,11 @@ class Trajectory(TimeResult):
 @of_structures
 def integrate(
     system: System,
-    state: Any = None,
-    *,
     omega: Positive,
-    periods: Count = 10,
+    *,
+    start: Any = None,
     transient: Index = 0,
+    periods: Count = 10,
     steps_per_period: Count | None = None,
     parameters: Mapping[str, float] | None = None,
     method: str = "accurate",
@@ -119,13 +119,13 @@ def integrate(
 
     Parameters
     ----------
-    state
-        Displacements and velocities at t = 0, shape (2 n,); a periodic motion, whose state at t = 0 is taken; None for
-        rest.
     omega
         Circular frequency of the load.
-    periods, transient
-        Periods of the load that are given, after some that are left out. Angles begin within half a turn; from there on
+    start
+        Displacements and velocities at t = 0, shape (2 n,); a periodic motion, whose state at t = 0 is taken; None for
+        rest.
+    transient, periods
+        Periods of the load that are left out, and those that are given. Angles begin within half a turn; from there on
         displacements go on through turns.
     steps_per_period
         Instants in one period at which the motion is given (default 200); of Newmark's method its steps (default 1000).
@@ -146,21 +146,21 @@ def integrate(
         If the motion leaves the range of numbers, or Newmark's equations could not be solved.
     """
     samples = steps_of(method, steps_per_period)
-    start = start_state(system, state)
+    begin = start_state(system, start)
     flow = Flow(system, method, samples, samples, tolerance, lanes=FEW, folded=False)
     values, omega = system.read_values(parameters), check_omega(omega)
     if system.turns:
-        start = _within_a_turn(system, start, omega, transient, values, method, samples, tolerance)
+        begin = _within_a_turn(system, begin, omega, transient, values, method, samples, tolerance)
         transient = 0
     with reporting(options.get("progress"), "integrating") as report:
         motions = flow.over(
-            start, omega, periods + transient, values, skip=max(transient * samples - 1, 0), measure=True, report=report
+            begin, omega, periods + transient, values, skip=max(transient * samples - 1, 0), measure=True, report=report
         ).checked()
     states, peaks = motions.states[0], motions.peaks[0]
     if transient:  # the last instant of the transient is the first that is given
         peaks = peaks[1:]
     else:
-        states = np.vstack([start[None], states])
+        states = np.vstack([begin[None], states])
     n = system.n
     return Trajectory(
         time=np.arange(len(states), dtype=float) * (2.0 * np.pi / float(omega) / samples),

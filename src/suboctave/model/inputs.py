@@ -153,7 +153,10 @@ def start_state(system: System, state: Any) -> Array:
     given = next((one for one in held if one is not None), state)
     array = numbers_of(given() if callable(given) else given)
     if array.shape != (2 * system.n,) or not np.isfinite(array).all():
-        raise InputError(f"state must be {2 * system.n} finite numbers, displacements and then velocities")
+        raise InputError(
+            f"start must be {2 * system.n} finite numbers, displacements and then velocities, or a motion, not "
+            f"{shortened(state)}"
+        )
     return array
 
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     import xarray
 
 
-_POINTING = {"up": "^", "down": "v", "rest": "o"}
+_POINTING = {"up": "^", "down": "v", "anew": "o"}
 #: share of the axis beyond what is drawn
 _MARGIN = 0.02
 #: of what does not repeat, left the range or is missing: what it is called, its colour in a plane of states
@@ -152,7 +152,7 @@ def plot_stepped_sine(
         for period in sorted({int(p) for p in periods[s] if p >= 0}, key=lambda p: (p == 0, p)):
             here = periods[s] == period
             name = "not settled" if period == 0 else _name(period)
-            mark = Mark(_POINTING.get(str(direction), "s"), 3.6, "none", _colour(period), 0.8)
+            mark = Mark(_POINTING[str(direction)], 3.6, "none", _colour(period), 0.8)
             at = np.array([omega[here], values[s][here]])
             marks = Markers(at, mark, cut=True, role=f"{direction} {name}", layer=4.0)
             frame.add(marks, f"{name}, stepped {direction}")
@@ -188,7 +188,7 @@ def _add_motions(frame: Frame, row: xarray.Dataset, start: str, dof: int, sectio
             frame.add(_points(at, period, 1.8 if period else 0.9, role))
             frame.entries[name] = Entry(mark=dot(_colour(period)))  # large enough for its colour to be seen
         else:
-            mark = Mark(_POINTING.get(start, "s"), 3.2, "none", _colour(period), 0.7)
+            mark = Mark(_POINTING[start.split()[0]], 3.2, "none", _colour(period), 0.7)
             at = np.array([values[here], known.max(axis=1)])
             frame.add(Markers(at, mark, cut=True, role=role, layer=4.0), name)
 

@@ -167,7 +167,7 @@ class RegimeMap(PlaneMap):
         *,
         points: Count = 200,
         seed: Index = 0,
-        states: Count = 4,
+        starts: Index = 4,
         transient: Index = 400,
         progress: Progress = None,
         seconds: Positive | None = None,
@@ -178,7 +178,7 @@ class RegimeMap(PlaneMap):
         ----------
         points, seed
             How many points, drawn evenly from the plane with this seed.
-        states
+        starts
             From how many states, drawn at random from all orders of magnitude between the smallest motion of the map
             and twice the largest, or the linear response in resonance; the known stable motions, slightly disturbed,
             are starts as well.
@@ -187,14 +187,14 @@ class RegimeMap(PlaneMap):
         seconds
             Time limit; what is not complete then is no check, and a TimeLimitError says so.
         """
-        for name, number, least in (("points", points, 1), ("states", states, 0), ("transient", transient, 1)):
+        for name, number, least in (("points", points, 1), ("starts", starts, 0), ("transient", transient, 1)):
             check_count(name, number, least)
         with reporting(progress, "integrating at points of the map") as report:
             work = _Check(self, points, seed)
             for number in range(points):
                 if report is not None:
                     report(0.3 * number / points, f"motions at point {number + 1} of {points}")
-                work.begin_at(number, states)
+                work.begin_at(number, starts)
             landings = work.landings(transient, None if report is None else lambda s, text: report(0.3 + 0.7 * s, text))
         return RegimeCheck(tuple(landings), points, self.system, self.parameter)
 
@@ -394,7 +394,7 @@ class RegimeCheck:
                 continue
             system = self.system.with_parameters({self.name: one.value})
             with suppress(ConvergenceError):
-                orbits.append(periodic_orbit(system, one.omega, state=one.state, subharmonic=one.period))
+                orbits.append(periodic_orbit(system, one.omega, start=one.state, subharmonic=one.period))
         return orbits
 
     @property
@@ -488,7 +488,7 @@ class _Check:
             return {}
         omega, values = (np.array([getattr(start, name) for start in states]) for name in ("omega", "value"))
         sections = poincare_sections(
-            self.regimes.system, np.array(list(states.values())), omega=omega, transient=periods, periods=_KEPT,
+            self.regimes.system, start=np.array(list(states.values())), omega=omega, transient=periods, periods=_KEPT,
             parameters={self.regimes.parameter: values}, tolerance=_TOLERANCE, period_tolerance=_REPEATS,
             observe=self.regimes.options.get("observe"), progress=progress,
         )  # fmt: skip

@@ -40,7 +40,7 @@ class Basins(Step, kind="basins", verb=basins, besides=("coordinates", "branches
     box: list[Range] = Field(min_length=2, max_length=2)
     grid: list[int] = Field(default=[200, 200], min_length=2, max_length=2)
     coordinates: list[str] | None = None
-    rest: State = None
+    start: State = None
     branches: list[Curve] = Field(default_factory=list)
     periods: int = Field(default=500, ge=1)
     tolerance: float = Field(default=1e-8, ge=1e-15, le=1e-2)
@@ -73,12 +73,12 @@ def _states(result: BasinsResult) -> dict[str, np.ndarray]:
 
 
 class Lyapunov(Step, kind="lyapunov_exponents", verb=lyapunov_exponents):
-    """`so.lyapunov_exponents` from a `state`, default rest, at one frequency."""
+    """`so.lyapunov_exponents` from a `start`, default rest, at one frequency."""
 
     omega: float = Field(gt=0.0)
-    state: State = None
-    periods: int = Field(default=1000, ge=1)
+    start: State = None
     transient: int = Field(default=300, ge=0)
+    periods: int = Field(default=1000, ge=1)
     count: int | None = Field(default=None, ge=1)
     trajectories: int = Field(default=16, ge=1)
     tolerance: float | None = Field(default=None, ge=1e-15, le=1e-2)
@@ -100,14 +100,14 @@ Tap = Annotated[list[float], Field(min_length=3, max_length=3)]
 
 
 class SteppedSineStep(Step, kind="stepped_sine", verb=stepped_sine):
-    """`so.stepped_sine` over `omega` in `steps`; `state` and the rest as there."""
+    """`so.stepped_sine` over `omega`; all else as there."""
 
     omega: Range
-    steps: int = Field(default=200, ge=1)
-    direction: Literal["up", "down", "both"] = "up"
-    settle: int = Field(default=200, ge=1)
-    measure: int = Field(default=60, ge=1)
-    state: list[float] | None = None
+    values: int | list[float] = 201
+    direction: str | list[str] = "up"
+    start: list[float] | None = None
+    transient: int = Field(default=200, ge=1)
+    periods: int = Field(default=60, ge=1)
     tap: Tap | None = None
     harmonics: list[float] = Field(default_factory=lambda: [0.0, 0.5, 1.0, 2.0, 3.0])
     noise: float = Field(default=0.0, ge=0.0)
@@ -116,7 +116,7 @@ class SteppedSineStep(Step, kind="stepped_sine", verb=stepped_sine):
 
     def arguments(self, context: CheckContext | Context) -> dict[str, Any]:
         tap = self.tap and (self.tap[0], int(self.tap[1]), self.tap[2])
-        return {**super().arguments(context), "tap": tap, "state": self.state}
+        return {**super().arguments(context), "tap": tap, "start": self.start}
 
     def check(self, around: CheckContext) -> Iterator[Complaint]:
         if self.tap is not None and self.tap[1] != int(self.tap[1]):
