@@ -44,6 +44,8 @@ def the_same(a, b, path="branch"):
     elif dataclasses.is_dataclass(a):
         assert type(a) is type(b), path
         for field in dataclasses.fields(a):
+            if field.name == "curve":  # of a point, the curve that it is read back with
+                continue
             the_same(getattr(a, field.name), getattr(b, field.name), f"{path}.{field.name}")
     elif isinstance(a, dict):
         assert list(a) == list(b), path

@@ -21,6 +21,7 @@ from suboctave.harmonic.perturbation import Kind
 from suboctave.harmonic.waves import Waves
 from suboctave.kinds import KINDS, TRACKED_KINDS, suggest_kind
 from suboctave.lazy import lazy
+from suboctave.motion import Motion
 
 #: kinds at which a curve meets a contact, without having to change in number or stability
 CONTACT_KINDS = ("grazing",)
@@ -65,7 +66,7 @@ class CriticalMotion:
 
 @checked(result=True)
 @dataclass(frozen=True, eq=False)
-class Bifurcation:
+class Bifurcation(Motion):
     """A motion at which the response changes its nature, or a contact begins or ceases to touch.
 
     Attributes

@@ -3,28 +3,34 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
+from typing import Any, Self
 
 from suboctave.arguments import checked
 from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.continuation import Event, NewtonOptions, SteppingOptions
 from suboctave.continuation.ending import Ending, EndReason, interruption_of
 from suboctave.curves.events.formulation import BORDERED, Formulation
+from suboctave.errors import InputError, suggest
 from suboctave.floquet.methods import StabilityMethod
 from suboctave.floquet.result import FloquetResult
+from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.lazy import lazy
+from suboctave.motion import Motion
 from suboctave.progress import CurveProgress, Report
 
 
 @checked(result=True)
-@dataclass(frozen=True, eq=False)
-class BranchPoint:
+@dataclass(frozen=True, eq=False, repr=False)
+class BranchPoint(Motion):
     """One point of a branch: orbit, multipliers, position in scaled arclength, Newton iterations.
 
     The multipliers are computed when asked for, by `method`, unless they are `known`. `still`: whether the branch's
-    parameter stands still along a piece about it, on which a multiplier stays at +1.
+    parameter stands still along a piece about it, on which a multiplier stays at +1. `curve`: the curve that it is a
+    point of, which says what is observed and what decides whether it is stable.
     """
 
     orbit: PeriodicOrbit
@@ -33,6 +39,46 @@ class BranchPoint:
     iterations: int
     method: StabilityMethod | None = None
     still: bool = field(default=False, kw_only=True)
+    curve: Any = field(default=None, kw_only=True)
+
+    def on(self, curve: Any) -> Self:
+        """The same as a point of a curve."""
+        point = copy(self)
+        object.__setattr__(point, "curve", curve)
+        return point
+
+    @property
+    def omega(self) -> float:
+        """Circular frequency of the load."""
+        return self.orbit.omega
+
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """All parameters of the system by name."""
+        return self.orbit.values
+
+    def parameter(self, name: str) -> float:
+        """omega or a parameter by name."""
+        if name == "omega":
+            return self.omega
+        if name not in self.parameters:
+            raise InputError(f"unknown parameter {name!r}{suggest(name, ['omega', *self.parameters])}")
+        return self.parameters[name]
+
+    @property
+    def amplitude(self) -> float:
+        """Largest |x| over a period of the DOF that its curve observes; of others `point.orbit.amplitude(dof)`."""
+        return self.orbit.amplitude(self.orbit.system.observed_dof if self.curve is None else self.curve.observe)
+
+    @property
+    def multipliers(self) -> ComplexArray:
+        """Floquet multipliers over the motion's own period, (2 N,)."""
+        return self.floquet.multipliers
+
+    def __repr__(self) -> str:
+        names = [n for n in getattr(self.curve, "names", (getattr(self.curve, "name", "omega"),)) if n != "omega"]
+        free = "".join(f", {name}={self.parameter(name):.9g}" for name in names)
+        return f"<point at omega={self.omega:.9g}{free}, amplitude={self.amplitude:.7g}>"
 
     @lazy
     def floquet(self) -> FloquetResult:
@@ -44,7 +90,7 @@ class BranchPoint:
 
 
 @checked(result=True)
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class TrackedPoint(BranchPoint):
     """One point of a tracked curve: a branch point with the extra unknown and the coefficient of its normal form.
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from suboctave.harmonic.trigonometric import motion
 from suboctave.harmonic.truncation import AdaptiveHarmonics
 from suboctave.model.elements.coupled import as_coupled
 from suboctave.model.system import System
+from suboctave.motion import Motion, answer
 
 #: share of a motion that its sub-harmonics may have where it repeats earlier
 _REPEATED = 1e-6
@@ -27,7 +29,7 @@ _REPEATED = 1e-6
 
 @checked(result=True)
 @dataclass(frozen=True, eq=False)
-class PeriodicOrbit:
+class PeriodicOrbit(Motion):
     """One periodic motion of a system, solved by harmonic balance.
 
     Attributes
@@ -82,6 +84,17 @@ class PeriodicOrbit:
     def period(self) -> float:
         """Period of the motion, `2 pi nu / omega`."""
         return 2.0 * math.pi * self.basis.nu / self.omega
+
+    @cached_property
+    def floquet(self) -> Any:
+        """Floquet multipliers over its own period with their errors, and the verdict: `suboctave.stability`."""
+        return answer("floquet_of")(self)
+
+    @property
+    def multipliers(self) -> ComplexArray:
+        """Floquet multipliers over its own period, (2 N,), by descending modulus."""
+        result: ComplexArray = self.floquet.multipliers
+        return result
 
     @property
     def own_period(self) -> int:
@@ -154,6 +167,22 @@ class PeriodicOrbit:
     def amplitude(self, dof: GivenDof = 0) -> float:
         """Largest |x| of a DOF over the motion's period, found by Newton's method on dx/dt = 0."""
         return peak(self._along(dof))[0]
+
+    def peak_to_peak(self, dof: GivenDof = 0) -> float:
+        """Largest minus smallest x of a DOF over the motion's period, found as `amplitude`."""
+        c = self._along(dof)
+        # lifted, x has one sign, and its largest modulus is at its largest or its smallest value
+        lift = 2.0 * float(np.abs(c).sum())
+        above, below = c.copy(), -c
+        above[0] += lift
+        below[0] += lift
+        return max(0.0, peak(above)[0] + peak(below)[0] - 2.0 * lift)
+
+    def amplitude_about_mean(self, dof: GivenDof = 0) -> float:
+        """Largest distance of a DOF from its mean over the motion's period, found as `amplitude`."""
+        c = self._along(dof).copy()
+        c[0] = 0.0
+        return peak(c)[0]
 
     def velocity_amplitude(self, dof: GivenDof = 0) -> float:
         """Largest |dx/dt| of a DOF over the motion's period, as `amplitude`."""

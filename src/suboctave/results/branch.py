@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
 from operator import attrgetter
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,8 @@ from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.kinds import KINDS
 from suboctave.model.system import System
 from suboctave.pictures.cells import Pictured
-from suboctave.results.readings import BranchReadings, columns, with_readings
+from suboctave.results.points import Peaks, Points, peaks_of, points_at
+from suboctave.results.readings import BranchReadings, Readings, columns, measure_of, with_readings
 from suboctave.store.layout import parameter_column
 from suboctave.store.plain import padded
 from suboctave.store.registry import Stored
@@ -42,7 +43,7 @@ class CurveTables(Stored, Pictured):
     """One curve or several, as tables and as their files."""
 
     @abstractmethod
-    def to_dataframe(self, readings: Iterable[str] | bool = False) -> pandas.DataFrame:
+    def to_dataframe(self, readings: Readings = False) -> pandas.DataFrame:
         """One row per point."""
 
     @abstractmethod
@@ -131,7 +132,7 @@ class Branch(CurveTables, BranchReadings):
     ) -> None:
         self.system = system
         self.name = name
-        self.points = tuple(points)
+        self.points = tuple(point.on(self) for point in points)
         self.bifurcations = BifurcationList(bifurcations)
         self.events = BifurcationList(events, tuple({e.kind for e in events}))
         self.closed = closed
@@ -146,6 +147,58 @@ class Branch(CurveTables, BranchReadings):
 
     def __len__(self) -> int:
         return len(self.points)
+
+    def __iter__(self) -> Iterator[BranchPoint]:
+        return iter(self.points)
+
+    @overload
+    def __getitem__(self, key: int) -> BranchPoint: ...
+    @overload
+    def __getitem__(self, key: slice) -> Points: ...
+
+    def __getitem__(self, key: int | slice) -> BranchPoint | Points:
+        """A point by its place, `curve[-1]` the last one, or some of them, `curve[10:20]`."""
+        return Points(self, self.points[key]) if isinstance(key, slice) else self.points[key]
+
+    def bound(self, point: BranchPoint) -> BranchPoint:
+        """A motion on the curve as one of its points."""
+        return point.on(self)
+
+    def at(self, **place: float) -> Points:
+        """All points at a value of a parameter that the curve was followed in, such as `curve.at(omega=1.5)`.
+
+        They are solved between those of the curve, in its order: several where it folds, none, with words why when they
+        are printed, outside its range. Their stability is computed when it is asked for.
+
+        Raises
+        ------
+        InputError
+            For a parameter that was not free.
+        ConvergenceError
+            If Newton's method does not arrive at a point.
+        """
+        return points_at(self, place)
+
+    def peaks(
+        self,
+        quantity: str | Callable[[PeriodicOrbit], float] = "amplitude",
+        *,
+        dof: GivenDof | None = None,
+        harmonic: float | None = None,
+    ) -> Peaks:
+        """The local maxima of a quantity along the curve, solved for, with their half-power widths and phases.
+
+        Parameters
+        ----------
+        quantity
+            "amplitude" (default), another reading by its name (`reading`), or a function of a motion.
+        dof
+            Of which degree of freedom, by number or name; default the observed one.
+        harmonic
+            The amplitude of the component at this multiple of omega instead.
+        """
+        what, measure = measure_of(self, quantity, dof, harmonic)
+        return peaks_of(self, what, measure, self._dof(dof), harmonic)
 
     @property
     def ended(self) -> str:
@@ -274,11 +327,12 @@ class Branch(CurveTables, BranchReadings):
         """How many harmonics are unknowns at each point: all up to the highest, shape (len,), int."""
         return self.harmonics
 
-    def to_xarray(self, readings: Iterable[str] | bool = False, motions: bool = False) -> xarray.Dataset:
+    def to_xarray(self, readings: Readings = False, motions: bool = False) -> xarray.Dataset:
         """The branch as a labelled dataset: points, events, and what produced them.
 
-        `readings`: names of read-offs to add (see `reading`), or True for all of `available_readings`. `motions`: with
-        the Fourier coefficients of the motions (`suboctave.store.motions.with_motions`).
+        `readings`: names of read-offs to add (see `reading`), functions of a motion, or True for all of
+        `available_readings`. `motions`: with the Fourier coefficients of the motions
+        (`suboctave.store.motions.with_motions`).
         """
         from suboctave.store.layout import branch_dataset, events_met
         from suboctave.store.motions import with_motions
@@ -286,7 +340,7 @@ class Branch(CurveTables, BranchReadings):
         dataset = with_readings(branch_dataset(self), self, events_met(self), readings)
         return with_motions(dataset, self) if motions else dataset
 
-    def to_dataframe(self, readings: Iterable[str] | bool = False) -> pandas.DataFrame:
+    def to_dataframe(self, readings: Readings = False) -> pandas.DataFrame:
         """One row per point: free parameters, amplitude, stability, leading multiplier, errors; read-offs on request.
 
         `readings` as in `to_xarray`. A parameter that bears the name of another column is in "parameter.NAME".
@@ -304,7 +358,7 @@ class Branch(CurveTables, BranchReadings):
         """The parameters that it was followed in."""
         return (self.name,)
 
-    def _columns(self, readings: Iterable[str] | bool) -> dict[str, Any]:
+    def _columns(self, readings: Readings) -> dict[str, Any]:
         """The columns of `to_dataframe` but omega and the free parameters."""
         leading = self.multipliers[:, 0]
         return {
@@ -474,7 +528,7 @@ class TrackedBranch(Branch):
     def _free(self) -> tuple[str, ...]:
         return self.names
 
-    def _columns(self, readings: Iterable[str] | bool) -> dict[str, Any]:
+    def _columns(self, readings: Readings) -> dict[str, Any]:
         """As of any branch, and `coefficient`, and `kappa` of an NS curve."""
         own = super()._columns(readings) | {"coefficient": self.coefficient}
         return own | {"kappa": self.kappa} if self.kind in ("NS", "Hopf") else own

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -16,7 +16,7 @@ from suboctave.curves.junction import period_name
 from suboctave.errors import InputError
 from suboctave.interruption import Interruption
 from suboctave.results.branch import Branch, CurveTables
-from suboctave.results.readings import shared
+from suboctave.results.readings import Readings, shared
 from suboctave.store.layout import led_by
 
 if TYPE_CHECKING:
@@ -189,7 +189,7 @@ class BifurcationDiagram(CurveTables):
         met = (item for branch in self.branches for item in (*branch.bifurcations, *branch.events))
         return list(dict.fromkeys(item.kind for item in met))
 
-    def to_dataframe(self, readings: Iterable[str] | bool = False) -> pandas.DataFrame:
+    def to_dataframe(self, readings: Readings = False) -> pandas.DataFrame:
         """One row per point: the number, period and depth of its branch, then what `Branch.to_dataframe` has.
 
         A read-off such as "harmonic_0.5" is nan on branches whose motions have no such component.
@@ -210,7 +210,7 @@ class BifurcationDiagram(CurveTables):
         ]
         return pd.concat([frame for frame in frames if len(frame)] or frames[:1], ignore_index=True)
 
-    def to_xarray(self, readings: Iterable[str] | bool = False, motions: bool = False) -> dict[str, xarray.Dataset]:
+    def to_xarray(self, readings: Readings = False, motions: bool = False) -> dict[str, xarray.Dataset]:
         """The datasets of all branches (`Branch.to_xarray`) by number and label: "1: 2T, PD 3.99 to PD 2.30".
 
         A read-off such as "harmonic_0.5" is left out of branches whose motions have no such component.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -14,6 +13,7 @@ from suboctave.curves.hopf import stilled
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.model.linearised import ALL_EIGENVALUES, eigenvalues
 from suboctave.results.branch import Branch
+from suboctave.results.readings import Readings
 
 if TYPE_CHECKING:
     import pandas
@@ -56,7 +56,7 @@ class Equilibria(Branch):
         result: ComplexArray = np.take_along_axis(values, order, axis=1)
         return result
 
-    def to_dataframe(self, readings: Iterable[str] | bool = False) -> pandas.DataFrame:
+    def to_dataframe(self, readings: Readings = False) -> pandas.DataFrame:
         """One row per point: the parameter, |x| of the observed DOF, stability, the leading eigenvalue, errors."""
         import pandas as pd
 

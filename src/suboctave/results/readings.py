@@ -25,7 +25,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -41,10 +41,14 @@ from suboctave.harmonic.trigonometric import crossings, extrema
 from suboctave.model.elements.smoothness import levels as levels_of
 from suboctave.model.inputs import check_element
 from suboctave.model.system import System
-from suboctave.store.layout import QUANTITIES, check_component, has_component, parameter_column, reading_name
+from suboctave.store.layout import QUANTITIES, RESERVED, check_component, has_component, parameter_column, reading_name
 
 if TYPE_CHECKING:
     import xarray
+
+
+#: what read-offs are asked for by: names, functions of a motion, True for all, False for none
+Readings: TypeAlias = str | Callable[[PeriodicOrbit], float] | Iterable[str | Callable[[PeriodicOrbit], float]] | bool
 
 
 def _of_a_dof(what: str, meaning: str) -> Callable[..., Array]:
@@ -82,6 +86,8 @@ class BranchReadings:
         return chosen_dof(given, self.observe, n, names=names)
 
     rms = _of_a_dof("rms", "Root mean square of the displacement over a period, its mean included.")
+    peak_to_peak = _of_a_dof("peak_to_peak", "Largest minus smallest displacement over a period.")
+    about_mean = _of_a_dof("about_mean", "Largest distance of the displacement from its mean over a period.")
     velocity = _of_a_dof("velocity", "Largest |dx/dt| over a period.")
     velocity_rms = _of_a_dof("velocity_rms", "Root mean square of the velocity.")
     acceleration = _of_a_dof("acceleration", "Largest acceleration, in modulus, over a period.")
@@ -234,6 +240,8 @@ def _somewhere(ratios: Array, harmonic: float | None) -> Array:
 _READ: Mapping[str, Callable[[PeriodicOrbit, int, float], Any]] = {
     "amplitude": lambda orbit, dof, _: orbit.amplitude(dof),
     "rms": lambda orbit, dof, _: orbit.rms(dof),
+    "peak_to_peak": lambda orbit, dof, _: orbit.peak_to_peak(dof),
+    "about_mean": lambda orbit, dof, _: orbit.amplitude_about_mean(dof),
     "velocity": lambda orbit, dof, _: orbit.velocity_amplitude(dof),
     "velocity_rms": lambda orbit, dof, _: orbit.rms(dof, 1),
     "acceleration": lambda orbit, dof, _: orbit.acceleration_amplitude(dof),
@@ -250,8 +258,10 @@ _READ: Mapping[str, Callable[[PeriodicOrbit, int, float], Any]] = {
     "modal_amplitude": lambda orbit, _dof, _: modal_amplitude(orbit.state()),
     "damping_ratio": lambda orbit, _dof, _: damping_ratio(orbit.state()),
 }
-_OF_A_DOF = ("rms", "velocity", "velocity_rms", "acceleration", "acceleration_rms")
+_OF_A_DOF = ("rms", "peak_to_peak", "about_mean", "velocity", "velocity_rms", "acceleration", "acceleration_rms")
 _OF_A_GAP = ("contact_share", "impacts")
+#: columns that have a meaning already
+_TAKEN = {*QUANTITIES, *RESERVED, "multiplier_real", "multiplier_imag", "truncation"}
 _NAME = re.compile(r"(?P<what>[a-z]+(?:_[a-z]+)*?)(?:_(?P<number>\d+(?:\.\d+|/0*[1-9]\d*)?))?(?:_dof(?P<dof>.+))?")
 
 
@@ -277,23 +287,85 @@ def read_reading(name: str) -> Reading:
     return Reading(what, int(dof) if dof is not None and dof.isdecimal() else dof, number)
 
 
-def shared(names: Iterable[str] | bool, periods: Sequence[int]) -> list[list[str] | bool]:
+def measure_of(
+    branch: Any, quantity: str | Callable[[PeriodicOrbit], float], dof: Any = None, harmonic: float | None = None
+) -> tuple[str, Callable[[PeriodicOrbit], float]]:
+    """A quantity of single motions, by the name of a reading or as a function of a motion: its name and itself."""
+    if callable(quantity):
+        if dof is not None or harmonic is not None:
+            raise InputError("a function of a motion is what it is: leave dof= and harmonic= out")
+        reading: Any = FunctionReading(quantity)
+    elif harmonic is not None:
+        if quantity != "amplitude":
+            raise InputError(f"harmonic={harmonic!r} is for the amplitude; leave it out, or {quantity!r}")
+        reading = Reading("harmonic", dof, float(harmonic)).placed(branch.system)
+    elif quantity == "amplitude":
+        reading = Reading("amplitude", dof).placed(branch.system)
+    else:
+        read = read_reading(quantity)
+        reading = (read if dof is None else replace(read, dof=dof)).placed(branch.system)
+    names = branch.system.dof_names
+    named = isinstance(reading, Reading) and isinstance(reading.dof, int) and names
+    what = replace(reading, dof=names[reading.dof]).name if named else reading.name
+    return what, lambda orbit: float(reading.of([orbit], branch.observe)[0])
+
+
+@dataclass(frozen=True)
+class FunctionReading:
+    """A read-off by a function of a motion, which gives a number."""
+
+    function: Callable[[PeriodicOrbit], float]
+
+    @property
+    def what(self) -> str:
+        """The name of the function; a column that has a name already keeps it."""
+        name = getattr(self.function, "__name__", type(self.function).__name__)
+        return name if name.isidentifier() and name not in _TAKEN else f"function.{name.strip('<>')}"
+
+    @property
+    def name(self) -> str:
+        """The name that it is stored under."""
+        return self.what
+
+    def placed(self, system: System) -> FunctionReading:
+        """Itself."""
+        return self
+
+    def of(self, orbits: Sequence[PeriodicOrbit], observe: int) -> Array:
+        """Its values, shape (len(orbits),)."""
+        return np.array([self._number(orbit) for orbit in orbits], dtype=float)
+
+    def _number(self, orbit: PeriodicOrbit) -> float:
+        value = self.function(orbit)
+        if not (np.ndim(value) == 0 and np.isrealobj(value) and isinstance(value, int | float | np.number)):
+            raise InputError(f"{self.what}(orbit) must give a real number, not {shortened(value)}")
+        return float(value)
+
+    def attributes(self, system: System) -> dict[str, str]:
+        """What a dataset says of it."""
+        return {"long_name": self.what, "units": ""}
+
+
+def shared(names: Readings, periods: Sequence[int]) -> list[list[Any] | bool]:
     """The names of read-offs for each of several branches, whose motions have these periods nu.
 
     A component such as `harmonic_0.5` is one of those branches only whose motions have it; InputError if none has.
     """
     if isinstance(names, bool):
         return [names for _ in periods]
-    chosen = {name: read_reading(name) for name in ([names] if isinstance(names, str) else names)}
-    components = {n: r.number or 0.0 for n, r in chosen.items() if QUANTITIES[r.what].numbered == "harmonic"}
+    listed = [names] if isinstance(names, str) or callable(names) else list(names)
+    chosen = {name: name if callable(name) else read_reading(name) for name in listed}
+    components = {
+        n: r.number or 0.0
+        for n, r in chosen.items()
+        if isinstance(r, Reading) and QUANTITIES[r.what].numbered == "harmonic"
+    }
     for k in components.values():
         check_component(k, periods)
     return [[n for n in chosen if n not in components or has_component(components[n], nu)] for nu in periods]
 
 
-def with_readings(
-    dataset: xarray.Dataset, branch: Any, events: Sequence[Any], names: Iterable[str] | bool
-) -> xarray.Dataset:
+def with_readings(dataset: xarray.Dataset, branch: Any, events: Sequence[Any], names: Readings) -> xarray.Dataset:
     """The dataset of a branch with read-offs on its points and, with the prefix `event_`, on its events."""
     for reading in _listed(branch, names):
         attributes = reading.attributes(branch.system)
@@ -308,23 +380,26 @@ def with_readings(
     return dataset
 
 
-def columns(branch: Any, names: Iterable[str] | bool) -> dict[str, Array]:
+def columns(branch: Any, names: Readings) -> dict[str, Array]:
     """Read-offs as the columns of a table."""
     return {reading.name: _on_points(branch, reading) for reading in _listed(branch, names)}
 
 
-def _on_points(branch: Any, reading: Reading) -> Array:
+def _on_points(branch: Any, reading: Reading | FunctionReading) -> Array:
     values = reading.of(branch.orbits, branch.observe)
     return _somewhere(values, 1) if reading.what == "transmissibility" else values
 
 
-def _listed(branch: Any, names: Iterable[str] | bool) -> list[Reading]:
+def _listed(branch: Any, names: Readings) -> list[Reading | FunctionReading]:
     if isinstance(names, bool):
         names = branch.available_readings() if names else []
-    if not isinstance(names, Iterable):
-        raise InputError(f"readings must be names, or True for all, not {shortened(names)}")
-    chosen = [names] if isinstance(names, str) else list(names)
-    return [read_reading(name).placed(branch.system) for name in dict.fromkeys(chosen)]
+    if not (isinstance(names, Iterable) or callable(names)):
+        raise InputError(f"readings must be names, functions of a motion, or True for all, not {shortened(names)}")
+    chosen = [names] if isinstance(names, str) or callable(names) else list(names)
+    return [
+        FunctionReading(name) if callable(name) else read_reading(name).placed(branch.system)
+        for name in dict.fromkeys(chosen)
+    ]
 
 
 # ----------------------------------------------------------------------------------- contacts: force, duration, impacts

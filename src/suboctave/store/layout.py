@@ -286,6 +286,8 @@ class Quantity:
 QUANTITIES: Mapping[str, Quantity] = {
     "amplitude": Quantity("max |x| over a period", "length", r"amplitude $\max\,|{x}|$"),
     "rms": Quantity("root mean square of x", "length", r"RMS of ${x}$"),
+    "peak_to_peak": Quantity("largest minus smallest x over a period", "length", r"peak to peak of ${x}$"),
+    "about_mean": Quantity("max |x - mean of x| over a period", "length", r"amplitude of ${x}$ about the mean"),
     "velocity": Quantity("max |dx/dt| over a period", "length / time", r"velocity $\max\,|\dot{{{x}}}|$"),
     "velocity_rms": Quantity("root mean square of dx/dt", "length / time", r"RMS of $\dot{{{x}}}$"),
     "acceleration": Quantity("max |d2x/dt2| over a period", "length / time^2", r"acceleration $\max\,|\ddot{{{x}}}|$"),

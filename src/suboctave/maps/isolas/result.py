@@ -24,7 +24,7 @@ from suboctave.maps.pieces import MonotonePiece, stable_ranges
 from suboctave.model.system import System
 from suboctave.pictures.cells import Pictured
 from suboctave.results.branch import Branch, TrackedBranch
-from suboctave.results.readings import shared
+from suboctave.results.readings import Readings, shared
 from suboctave.store.layout import isolas_dataset, led_by
 from suboctave.store.registry import Stored
 from suboctave.store.table import write_csv
@@ -371,7 +371,7 @@ class Isolas(Stored, Pictured, Sequence[Isola]):
     def _curves(self) -> tuple[TrackedBranch, ...]:
         return (*self.limit_points, *self.doublings)
 
-    def to_xarray(self, readings: Iterable[str] | bool = False, motions: bool = False) -> dict[str, xarray.Dataset]:
+    def to_xarray(self, readings: Readings = False, motions: bool = False) -> dict[str, xarray.Dataset]:
         """Datasets by name: "isolas" (one entry each, and their edges), all curves, the closed branches known.
 
         `suboctave.store.layout` describes the first, `Branch.to_xarray` the others.

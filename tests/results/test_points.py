@@ -1,0 +1,156 @@
+"""Points of a curve at a value, peaks, and what is asked of single motions: against closed forms and other ways."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import suboctave as so
+
+ZETA, F = 0.02, 0.3
+
+
+@pytest.fixture(scope="module")
+def duffing():
+    return so.System.from_equations(
+        "x'' + 2*zeta*x' + x + a*x**3 = f*cos(omega*t)", parameters={"zeta": ZETA, "a": 0.3, "f": F}
+    )
+
+
+@pytest.fixture(scope="module")
+def folded(duffing):
+    return so.frequency_response(duffing, (1.0, 3.0), harmonics=7)
+
+
+def test_the_peak_of_a_linear_response(duffing):
+    """At `sqrt(1 - 2 zeta^2)`, of the height `f / (2 zeta sqrt(1 - zeta^2))`; half of the power at
+    `1 - 2 zeta^2 -+ 2 zeta sqrt(1 - zeta^2)` squared.
+    """
+    curve = so.frequency_response(duffing.linear(), (0.5, 1.5))
+    (peak,) = curve.peaks()
+    root = np.sqrt(1.0 - ZETA**2)
+    assert_allclose(peak.omega, np.sqrt(1.0 - 2.0 * ZETA**2), rtol=1e-10)
+    assert_allclose(peak.height, F / (2.0 * ZETA * root), rtol=1e-10)
+    assert_allclose(np.square(peak.half_power), 1.0 - 2.0 * ZETA**2 + np.array([-2.0, 2.0]) * ZETA * root, rtol=1e-10)
+    assert_allclose(peak.width, 2.0 * ZETA, rtol=1e-3)
+    assert_allclose(np.tan(peak.phase), -np.sqrt(1.0 - 2.0 * ZETA**2) / ZETA, rtol=1e-8)
+    # the energy of motion is largest at the natural frequency
+    assert_allclose(curve.peaks("velocity")[0].omega, 1.0, rtol=1e-10)
+    assert_allclose(curve.peaks(lambda orbit: orbit.velocity_amplitude(0))[0].omega, 1.0, rtol=1e-10)
+    near = so.frequency_response(duffing.linear(), (0.99, 1.5))
+    assert near.peaks()[0].width is None  # does not come down that far on its left side
+    assert "no peak" in str(so.frequency_response(duffing.linear(), (1.1, 1.5)).peaks())
+
+
+def test_all_points_at_a_frequency(duffing, folded):
+    """Three on the folded curve, each a motion that shooting finds too; as many as there are crossings."""
+    found = folded.at(omega=1.6)
+    assert len(found) == 3
+    assert list(found.stable) == [True, False, True]
+    assert_allclose(found.omega, 1.6, rtol=0, atol=0)
+    for point in found:
+        assert so.verify(point).agrees
+        # of the curve of motions over another parameter
+        other = so.continue_branch(point, "f", (0.9 * F, 1.1 * F), harmonics=7)
+        again = other.at(f=F)
+        assert min(abs(again.amplitude - point.amplitude)) < 1e-9 * point.amplitude
+    # at a limit point, which lies between two points, from both sides
+    fold = folded.bifurcations["LP"][0].omega
+    assert len(folded.at(omega=fold - 1e-7)) == 3
+    assert len(folded.at(omega=fold + 1e-7)) == 1
+    near = folded.at(omega=fold - 1e-7)
+    assert_allclose(near.amplitude[0], near.amplitude[1], rtol=1e-3)
+
+
+def test_none_outside_and_why(folded):
+    found = folded.at(omega=9.0)
+    assert len(found) == 0
+    assert str(found) == "no point at omega = 9: the curve has omega from 1 to 3"
+    with pytest.raises(so.InputError, match="followed in omega, not in 'zeta'"):
+        folded.at(zeta=0.1)
+    with pytest.raises(so.InputError, match="takes one value"):
+        folded.at()
+    with pytest.raises(so.InputError, match="finite number"):
+        folded.at(omega=float("nan"))
+
+
+def test_a_curve_is_a_sequence_of_points(folded):
+    assert len(list(folded)) == len(folded)
+    assert folded[-1].omega == folded.at(omega=3.0)[0].omega == 3.0
+    assert [point.omega for point in folded[3:6]] == folded.omega[3:6].tolist()
+    assert [point.stable for point in folded] == folded.stable.tolist()
+    assert [point.amplitude for point in folded[:4]] == folded.amplitude[:4].tolist()
+
+
+def test_a_tracked_curve_at_either_of_its_parameters(duffing, folded):
+    """A limit point solved at another damping is that of the response with it."""
+    curve = so.track(folded.bifurcations["LP"][0], "f", (0.2, 0.4))
+    (point,) = curve.at(f=0.25)
+    response = so.frequency_response(duffing.with_parameters(f=0.25), (1.0, 3.0), harmonics=7)
+    assert_allclose(point.omega, response.bifurcations["LP"][0].omega, rtol=1e-9)
+    (same,) = curve.at(omega=point.omega)
+    assert_allclose(same.parameter("f"), 0.25, rtol=1e-9)
+    assert [one.stable for one in curve] == curve.stable.tolist()
+
+
+def test_the_peak_of_a_nonlinear_response_is_that_of_its_ridge(duffing, folded):
+    ridge = so.track_peak(folded, "f", (0.29, 0.31))
+    (there,) = ridge.at(f=F)
+    peak = folded.peaks().highest
+    assert_allclose([peak.omega, peak.height], [there.omega, there.amplitude], rtol=1e-8)
+
+
+def test_equilibria_and_cycles():
+    """`x'' - mu x' + x^2 x' + x = 0`: cycles of amplitude 2 sqrt(mu) at first."""
+    system = so.System.from_equations("x'' - mu*x' + x**2*x' + x = 0", parameters={"mu": 0.0})
+    still = so.equilibria(system, "mu", (-0.2, 0.3))
+    assert still.at(mu=0.123)[0].orbit.values["mu"] == 0.123
+    assert list(still.at(mu=-0.1).stable) == [True]
+    cycles = so.limit_cycles(still.bifurcations["Hopf"][0])
+    (cycle,) = cycles.at(mu=0.01)
+    assert_allclose(cycle.amplitude, 0.2, rtol=1e-3)
+    assert cycle.stable
+    assert cycle.orbit.stable  # in spite of the multiplier +1
+
+
+def test_what_is_asked_of_a_motion(folded):
+    """The same of an orbit, of a point and of a bifurcation; sums of the spectrum are the motion."""
+    point = folded.at(omega=1.2)[0]
+    table = point.to_dataframe(samples=101)
+    spectrum = point.spectrum("x")
+    t = table["time"].to_numpy()
+    amplitude, phase = spectrum["amplitude"].to_numpy(), spectrum["phase"].fillna(0.0).to_numpy()
+    waves = amplitude * np.cos(np.outer(t, spectrum["omega"]) + phase)
+    assert_allclose(waves.sum(axis=1), table["x_x"], atol=1e-12)
+    assert_allclose(table["v_x"], point.orbit.velocity(t)[0])
+    assert_allclose(spectrum["hertz"], spectrum["omega"] / (2.0 * np.pi))
+    for motion in (point.orbit, point, folded.bifurcations[0]):
+        assert len(motion.spectrum()) == len(spectrum)
+        assert len(motion.multipliers) == 2
+        assert motion.stable in (True, False)
+        assert motion.plot().axes
+    assert_allclose(np.prod(point.orbit.multipliers), np.exp(-4.0 * np.pi * ZETA / 1.2), rtol=1e-6)
+    assert not folded.at(omega=1.6)[1].orbit.stable
+
+
+def test_quantities_about_the_mean():
+    """`x = 2 + cos + 0.5 cos 2 tau`: from 1.25 to 3.5."""
+    system = so.System(1.0, 1.0, 1.0, loads=[so.HarmonicLoad(0, 1.0)])
+    curve = so.frequency_response(system, (1.0, 1.1), harmonics=2)
+    orbit = curve[0].orbit
+    x = np.array([[2.0], [1.0], [0.0], [0.5], [0.0]])
+    known = so.PeriodicOrbit(orbit.balance, x, orbit.omega, orbit.values, 0.0)
+    assert_allclose(known.peak_to_peak(), 3.5 - 1.25, rtol=1e-12)
+    assert_allclose(known.amplitude_about_mean(), 1.5, rtol=1e-12)
+    assert_allclose(curve.peak_to_peak(), 2.0 * curve.amplitude, rtol=1e-12)
+    assert_allclose(curve.about_mean(), curve.amplitude, rtol=1e-12)
+
+    def power(orbit):
+        return 0.5 * orbit.velocity_amplitude(0) ** 2
+
+    table = curve.to_dataframe(readings=["peak_to_peak", power])
+    assert_allclose(table["power"], 0.5 * curve.velocity() ** 2)
+    assert_allclose(table["peak_to_peak"], 2.0 * curve.amplitude)
+    with pytest.raises(so.InputError, match="must give a real number"):
+        curve.to_dataframe(readings=[lambda orbit: orbit.harmonic(1)])
