@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import gc
 import json
+import os
 from pathlib import Path
 
 import pytest
 
 import suboctave as so
+
+#: tests compute on one core each: what they find does not depend on it
+os.environ.setdefault("SUBOCTAVE_WORKERS", "1")
 
 
 def pytest_collection_finish():

@@ -125,5 +125,13 @@ def test_wrong_numbers_of_workers(workers_, scheduler, words):
         workers.check_workers(workers_, scheduler)
 
 
-def test_default_is_a_process_for_each_core():
+def test_default_is_a_process_for_each_core(monkeypatch):
+    monkeypatch.delenv("SUBOCTAVE_WORKERS", raising=False)
     assert workers.check_workers(None) == workers.processors() >= 1
+    # within a task no other process is begun
+    assert sorted(workers.completed(lambda _: workers.processors(), [0, 1], 2)) == [(0, 1), (1, 1)]
+    monkeypatch.setenv("SUBOCTAVE_WORKERS", "3")
+    assert workers.check_workers(None) == 3
+    monkeypatch.setenv("SUBOCTAVE_WORKERS", "all")
+    with pytest.raises(InputError, match="SUBOCTAVE_WORKERS='all' of the environment"):
+        workers.check_workers(None)

@@ -18,7 +18,7 @@ import textwrap
 from collections.abc import Callable
 from typing import Annotated, Any, ParamSpec, TypedDict, TypeVar, get_args, get_type_hints
 
-from suboctave.arguments import Positive, Progress, checked
+from suboctave.arguments import Count, Positive, Progress, checked
 
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
@@ -32,6 +32,16 @@ class RunOptions(TypedDict, total=False):
         Positive | None,
         "Time limit. What was computed by then is given, as after Ctrl-C (`interrupted`); a TimeLimitError where that "
         "is nothing.",
+    ]
+
+
+class ParallelOptions(RunOptions, total=False):
+    """Options of verbs whose work has independent parts."""
+
+    workers: Annotated[
+        Count | None,
+        "How many cores compute, as threads or as processes of their own; default all (SUBOCTAVE_WORKERS of the "
+        "environment, where it is set). The result is the same bits.",
     ]
 
 

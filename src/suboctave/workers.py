@@ -50,8 +50,16 @@ class Lost:
     words: str
 
 
+#: how many cores a process may use, in its environment
+_CORES = "SUBOCTAVE_WORKERS"
+
+
 def processors() -> int:
-    """How many cores this process may use."""
+    """How many cores this process may use: all, or as many as its environment says."""
+    if given := os.environ.get(_CORES):
+        if not (given.isdecimal() and int(given) >= 1):
+            raise InputError(f"{_CORES}={given!r} of the environment: give a positive whole number")
+        return int(given)
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
@@ -228,7 +236,7 @@ def _process(payload: bytes) -> subprocess.Popen[bytes]:
         [sys.executable, "-m", "suboctave.workers"],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
-        env={**os.environ, **_ONE_THREAD, "PYTHONPATH": places, "PYTHONSAFEPATH": "1"},
+        env={**os.environ, **_ONE_THREAD, _CORES: "1", "PYTHONPATH": places, "PYTHONSAFEPATH": "1"},
     )
     with suppress(OSError):  # it has died already: noticed when a task is sent
         _send(process.stdin, payload)

@@ -12,11 +12,11 @@ Psi: two more Jacobians give it, whatever Y is. A cusp solves it too; the first,
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Unpack
 
 import numpy as np
 
 from suboctave.analysis.options import Inherited, settings_of
-from suboctave.arguments import Positive, checked
 from suboctave.bifurcation.bifurcation import TrackedEvent
 from suboctave.continuation import NewtonOptions
 from suboctave.continuation.linear import length, one_thread
@@ -30,6 +30,8 @@ from suboctave.curves.tracked.start import curve_through, is_extremum, with_extr
 from suboctave.curves.tracked.tests import Extremum
 from suboctave.errors import InputError, shortened
 from suboctave.interruption import limited
+from suboctave.options import RunOptions, with_options
+from suboctave.progress import reporting
 
 #: step of the differences along Psi, in units of the motion and of the parameters' ranges
 _STEP = 3e-5
@@ -38,14 +40,14 @@ _CORRECTION = 1e-9
 _ITERATIONS = 12
 
 
-@checked
+@with_options(RunOptions)
 @limited
 def locate_extremum(
     extremum: TrackedEvent,
     *,
     formulation: Formulation | str | None = None,
     newton: NewtonOptions | None = None,
-    seconds: Positive | None = None,
+    **options: Unpack[RunOptions],
 ) -> TrackedEvent:
     """An extremum of a parameter along a curve of bifurcations, solved for by Newton's method from one that is known.
 
@@ -57,8 +59,6 @@ def locate_extremum(
         "bordered" (default) or "alcorta2019", the system of Alcorta et al. (Nonlinear Dynamics 98, 2019, Eq. 32).
     newton
         Tolerances and number of iterations.
-    seconds
-        Time limit, after which a TimeLimitError is raised.
 
     Raises
     ------
@@ -79,7 +79,9 @@ def locate_extremum(
     kept = {"observe": inherited.observe, "stability": inherited.known.get("stability")}
     settings = settings_of(orbit.system, {**kept, "newton": newton})
     names = (extremum.names[0], extremum.names[1])
-    with one_thread():
+    with one_thread(), reporting(options.get("progress"), "extremum") as report:
+        if report is not None:
+            report(0.0, repr(extremum))
         curve, u = curve_through(extremum, orbit.basis, names)
         newton = replace(settings.newton, iterations=max(_ITERATIONS, settings.newton.iterations))
         weights = curve.weights(u, 0.0)

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
-from typing import Annotated, Any, TypeVar, cast
+from typing import Annotated, Any, TypeVar, cast, get_type_hints
 
 from suboctave.arguments import Positive
 from suboctave.bifurcation.bifurcation import Bifurcation
@@ -30,7 +30,7 @@ from suboctave.harmonic.truncation import AdaptiveHarmonics
 from suboctave.kinds import KINDS
 from suboctave.model.inputs import observed_dof
 from suboctave.model.system import System
-from suboctave.options import RunOptions
+from suboctave.options import ParallelOptions, RunOptions
 from suboctave.progress import reporting
 from suboctave.results.branch import Branch
 
@@ -59,6 +59,10 @@ class SearchOptions(RunOptions, total=False):
     ]
 
 
+class DesignOptions(SearchOptions, ParallelOptions, total=False):
+    """Options of searches over a design parameter."""
+
+
 class TrackOptions(SearchOptions, total=False):
     """Options of verbs that locate bifurcations by a formulation of the user's choice."""
 
@@ -81,8 +85,9 @@ Options = TypeVar("Options", bound=SearchOptions)
 
 
 def handed_on(options: Options) -> Options:
-    """The options of a search that are those of each of its curves: all but progress and time limit."""
-    return cast("Options", {name: value for name, value in options.items() if name not in RunOptions.__annotations__})
+    """The options of a search that are those of each of its curves: all but progress, time limit and workers."""
+    own = get_type_hints(ParallelOptions)
+    return cast("Options", {name: value for name, value in options.items() if name not in own})
 
 
 def settings_of(system: System, options: Mapping[str, Any]) -> Settings:

@@ -17,7 +17,7 @@ import numpy as np
 
 from suboctave.analysis.free_vibrations import Backbone, backbones
 from suboctave.analysis.options import CurveOptions, CurveRun, SearchOptions, settings_of
-from suboctave.arguments import Count, Positive, checked
+from suboctave.arguments import Count, checked
 from suboctave.continuation import CurvePoint, NewtonOptions
 from suboctave.continuation.linear import one_thread
 from suboctave.continuation.newton import correct
@@ -35,8 +35,8 @@ from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.interruption import Interruption, limited, pass_on
 from suboctave.model.inputs import check_count, check_omega, check_range, check_system, start_state
 from suboctave.model.system import System
-from suboctave.options import with_options
-from suboctave.progress import Report
+from suboctave.options import RunOptions, with_options
+from suboctave.progress import Report, reporting
 from suboctave.results.branch import Branch
 from suboctave.timedomain import integrate
 
@@ -183,7 +183,7 @@ def subharmonic_start(curve: MotionProblem, run: CurveRun) -> Trace:
     return both_ways(point, run.ahead, run.bounds, run.settings)
 
 
-@checked
+@with_options(RunOptions)
 @limited
 def periodic_orbit(
     system: System,
@@ -194,7 +194,7 @@ def periodic_orbit(
     harmonics: Harmonics = "adaptive",
     transient: int = 0,
     newton: NewtonOptions | None = None,
-    seconds: Positive | None = None,
+    **options: Unpack[RunOptions],
 ) -> PeriodicOrbit:
     """The periodic motion near a state `(x, dx/dt)` in time, of one or several load periods, by harmonic balance.
 
@@ -208,8 +208,8 @@ def periodic_orbit(
         Period of the motion in periods of the load; one that repeats earlier is returned with its own period.
     transient
         Periods of the motion that are integrated in time before, to come closer to an attracting one.
-    seconds
-        Time limit, after which a TimeLimitError is raised.
+    newton
+        Tolerances and iterations of Newton's method.
 
     Raises
     ------
@@ -222,12 +222,16 @@ def periodic_orbit(
     check_system(system, (omega,))
     given = start_state(system, start)
     curve = make_curve(system, "omega", omega, omega, harmonics, order, None)
-    with one_thread():
+    with one_thread(), reporting(options.get("progress"), "periodic motion") as report:
         if transient:
+            if report is not None:
+                report(0.0, f"{transient} periods in time")
             end = transient * order * 2.0 * np.pi / omega
             moving = system.viscous_equivalent()
             trajectory = integrate(moving, given, np.array([0.0, end]), omega, moving.parameters, rtol=1e-8)
             given = np.concatenate((trajectory.x[-1], trajectory.v[-1]))
+        if report is not None:
+            report(0.5, f"omega = {omega:.6g}")
         point = start_point(curve, omega, given, newton or NewtonOptions())
     own = (orbit := Sample(point).orbit).own_period
     return (

@@ -40,7 +40,7 @@ from suboctave.model.inputs import (
 )
 from suboctave.model.projected import ProjectedSystem, Recovered, lost_in_words, project
 from suboctave.model.system import System
-from suboctave.options import RunOptions
+from suboctave.options import ParallelOptions, RunOptions
 from suboctave.pictures.cells import Pictured
 from suboctave.projection import in_basis, small_system
 from suboctave.store.plain import Recorded, flat, recorded, written_system
@@ -76,10 +76,8 @@ class TimeOptions(RunOptions, total=False):
     ]
 
 
-class ParallelOptions(TimeOptions, total=False):
+class SideBySideOptions(TimeOptions, ParallelOptions, total=False):
     """Options of verbs that follow trajectories side by side."""
-
-    workers: Annotated[Count | None, "Threads; default as many as there are processors. Results do not depend on it."]
 
 
 class RecognitionOptions(TimeOptions, total=False):
@@ -101,7 +99,7 @@ class RecognitionOptions(TimeOptions, total=False):
     ]
 
 
-class BasinOptions(RecognitionOptions, ParallelOptions, total=False):
+class BasinOptions(RecognitionOptions, SideBySideOptions, total=False):
     """Both."""
 
 

@@ -29,7 +29,7 @@ import numpy as np
 
 from suboctave.arguments import Count, Index, Positive, checked
 from suboctave.errors import ConvergenceError, InputError, shortened, suggest
-from suboctave.experiments.common import On, ParallelOptions, TimeResult, check_continuous, of_structures
+from suboctave.experiments.common import On, SideBySideOptions, TimeResult, check_continuous, of_structures
 from suboctave.experiments.poincare import state_sizes
 from suboctave.model.elements.base import Array
 from suboctave.model.inputs import check_omega, start_state, timed
@@ -158,7 +158,7 @@ def lyapunov_exponents(
     trajectories: Count = 16,
     method: Literal["variational"] = "variational",
     tolerance: float | None = None,
-    **options: Unpack[ParallelOptions],
+    **options: Unpack[SideBySideOptions],
 ) -> LyapunovExponents: ...
 
 
@@ -170,11 +170,11 @@ def lyapunov_exponents(
     start: Any = None,
     parameters: Mapping[str, float] | None = None,
     method: Literal["two_trajectories"] | TwoTrajectories,
-    **options: Unpack[ParallelOptions],
+    **options: Unpack[SideBySideOptions],
 ) -> Separation: ...
 
 
-@with_options(ParallelOptions)
+@with_options(SideBySideOptions)
 @timed
 @of_structures
 def lyapunov_exponents(
@@ -189,7 +189,7 @@ def lyapunov_exponents(
     trajectories: Count = 16,
     method: str | TwoTrajectories = "variational",
     tolerance: float | None = None,
-    **options: Unpack[ParallelOptions],
+    **options: Unpack[SideBySideOptions],
 ) -> LyapunovExponents | Separation:
     """The Lyapunov exponents of the motion that a trajectory settles on, with their standard errors.
 

@@ -13,7 +13,7 @@ from suboctave.arguments import Count, Index, Positive, checked
 from suboctave.errors import InputError
 from suboctave.experiments.common import (
     On,
-    ParallelOptions,
+    SideBySideOptions,
     TimeResult,
     check_continuous,
     of_structures,
@@ -115,7 +115,7 @@ class LyapunovMap(TimeResult):
         )
 
 
-@with_options(ParallelOptions)
+@with_options(SideBySideOptions)
 @timed
 @of_structures
 def lyapunov_map(
@@ -130,7 +130,7 @@ def lyapunov_map(
     transient: Index = 200,
     periods: Count = 400,
     tolerance: Positive = 1e-8,
-    **options: Unpack[ParallelOptions],
+    **options: Unpack[SideBySideOptions],
 ) -> LyapunovMap:
     """The largest Lyapunov exponent over the frequency and a parameter; all processors work.
 

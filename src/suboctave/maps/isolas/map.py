@@ -17,13 +17,13 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, Unpack
 
 import numpy as np
 
 from suboctave.analysis.options import SearchOptions
 from suboctave.analysis.track import track
-from suboctave.arguments import Count, Positive, Progress, checked
+from suboctave.arguments import Positive, checked
 from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.continuation.problem import Array
 from suboctave.curves.identity import lies_on
@@ -36,6 +36,7 @@ from suboctave.maps.isolas.result import Isola, IsolaEnd, Isolas
 from suboctave.maps.pieces import MonotonePiece, across, pieces_of
 from suboctave.model.inputs import check_bounds, check_parameter, timed
 from suboctave.model.system import System
+from suboctave.options import ParallelOptions, with_options
 from suboctave.results.branch import TrackedBranch
 from suboctave.store.layout import parameter_column
 from suboctave.store.table import Table
@@ -47,7 +48,7 @@ _PROBED = (0.1, 0.5, 0.9)
 _AGREES = 1e-3
 
 
-@checked
+@with_options(ParallelOptions)
 @timed
 def isola_map(
     isolas: Isola | Isolas | Sequence[Isola],
@@ -55,10 +56,8 @@ def isola_map(
     bounds: tuple[float, float],
     *,
     probes: int | Sequence[float] = 3,
-    max_step: float | None = None,
-    workers: Count | None = 1,
-    progress: Progress = None,
-    seconds: Positive | None = None,
+    max_step: Positive | None = None,
+    **options: Unpack[ParallelOptions],
 ) -> IsolaMap:
     """Where in two design parameters an isola exists: its birth and its merging followed in a second parameter.
 
@@ -73,10 +72,8 @@ def isola_map(
         middle of it, evenly spread; 0 for none; or these values.
     max_step
         As in `track`.
-    workers
-        Processes (None: one for each core) among which the probes are divided. The result is the same bits.
-    seconds
-        Time limit, after which the map holds the curves that are complete.
+
+    The probes are divided among `workers`. After a time limit the map holds the curves that are complete.
 
     Returns
     -------
@@ -108,9 +105,10 @@ def isola_map(
             f"search with a system whose {parameter} lies within"
         )
     places = checked_values("probes", probes, (low, high), least=0)
-    options = first.options if max_step is None else {**first.options, "max_step": max_step}
-    regions = _Regions(system, name, parameter, (low, high), options, check_workers(workers))
-    with regions.reporting(progress, f"isolas over {name} and {parameter}"):
+    of_curves = first.options if max_step is None else {**first.options, "max_step": max_step}
+    workers = check_workers(options.get("workers"))
+    regions = _Regions(system, name, parameter, (low, high), of_curves, workers)
+    with regions.reporting(options.get("progress"), f"isolas over {name} and {parameter}"):
         for number, isola in enumerate(items):
             regions.progress(number / len(items), f"isola {number + 1} of {len(items)}")
             regions.follow(isola, places)

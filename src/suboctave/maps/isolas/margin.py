@@ -14,17 +14,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Unpack
 
 import numpy as np
 
 from suboctave.analysis.locate_extremum import locate_extremum
 from suboctave.analysis.sensitivity import foretold, sensitivity
-from suboctave.arguments import Positive, checked
+from suboctave.arguments import checked
 from suboctave.bifurcation.bifurcation import TrackedEvent
 from suboctave.continuation.linear import length
 from suboctave.errors import ConvergenceError, InputError, is_number, shortened, suggest
 from suboctave.interruption import check_time, limited
 from suboctave.maps.isolas.result import Isola
+from suboctave.options import RunOptions, with_options
+from suboctave.progress import reporting
 
 #: most iterations, and change of the scaled parameters and of g over its slope at which they end
 _ITERATIONS, _CLOSE = 50, 1e-9
@@ -69,7 +72,7 @@ class DesignMargin:
         return "\n".join(lines)
 
 
-@checked
+@with_options(RunOptions)
 @limited
 def design_margin(
     isola: Isola,
@@ -78,7 +81,7 @@ def design_margin(
     at: float | None = None,
     scales: Mapping[str, float] | None = None,
     end: str = "born",
-    seconds: Positive | None = None,
+    **options: Unpack[RunOptions],
 ) -> DesignMargin:
     """The smallest change of parameters, measured by scales, with which an isola is gone.
 
@@ -95,8 +98,6 @@ def design_margin(
         value, so that changes are shares.
     end
         "born": to where the closed branch vanishes; "merges": to where it joins the others.
-    seconds
-        Time limit, after which a TimeLimitError is raised.
 
     Raises
     ------
@@ -119,18 +120,21 @@ def design_margin(
     surface = _Surface.of(isola, by, float(here), scales)
     y, linear = np.zeros(len(surface.names)), 0.0
     item: TrackedEvent = start
-    for number in range(_ITERATIONS):
-        check_time()
-        gap, slope = surface.at(item, y)
-        steep = length(slope)
-        if not steep > 0.0:
-            raise ConvergenceError(f"none of {', '.join(surface.names)} moves where the isola is {end}")
-        linear = linear if number else abs(gap) / steep
-        step = (slope @ y - gap) / steep**2 * slope - y
-        size = length(step)
-        if size <= _CLOSE * max(1.0, length(y)) and abs(gap) <= _CLOSE * steep:
-            return surface.margin(item, y, linear)
-        item, y = surface.followed(item, y, step * min(1.0, _LONGEST / size))
+    with reporting(options.get("progress"), "design margin") as report:
+        for number in range(_ITERATIONS):
+            check_time()
+            if report is not None:
+                report(number / _ITERATIONS, f"{length(y):.4g} away")
+            gap, slope = surface.at(item, y)
+            steep = length(slope)
+            if not steep > 0.0:
+                raise ConvergenceError(f"none of {', '.join(surface.names)} moves where the isola is {end}")
+            linear = linear if number else abs(gap) / steep
+            step = (slope @ y - gap) / steep**2 * slope - y
+            size = length(step)
+            if size <= _CLOSE * max(1.0, length(y)) and abs(gap) <= _CLOSE * steep:
+                return surface.margin(item, y, linear)
+            item, y = surface.followed(item, y, step * min(1.0, _LONGEST / size))
     raise ConvergenceError(
         f"no nearest design without the isola was found: {_ITERATIONS} steps lead {length(y):.4g} away"
     )

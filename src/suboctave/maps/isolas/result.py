@@ -311,12 +311,12 @@ class Isolas(Stored, Pictured, Sequence[Isola]):
         return self._items[which]
 
     @limited
-    def at(self, value: float, *, seconds: Positive | None = None) -> list[Branch]:
+    def at(self, value: float, *, progress: Progress = None, seconds: Positive | None = None) -> list[Branch]:
         """The closed branches that exist at a value of the parameter; `seconds`: time limit of all of them."""
         branches: list[Branch] = []
         for isola in self:
             if value in isola and not (branches and branches[-1].interrupted):
-                branches.append(isola.at(value))
+                branches.append(isola.at(value, progress=progress))
         return branches
 
     @property

@@ -22,7 +22,7 @@ from typing import Any, Unpack
 import numpy as np
 
 from suboctave.analysis.branches import continue_branch
-from suboctave.analysis.options import SearchOptions
+from suboctave.analysis.options import DesignOptions
 from suboctave.analysis.subharmonics import Seeds
 from suboctave.curves.identity import lies_on
 from suboctave.curves.junction import period_name
@@ -38,7 +38,7 @@ from suboctave.options import with_options
 from suboctave.workers import check_workers
 
 
-@with_options(SearchOptions)
+@with_options(DesignOptions)
 @timed
 def find_isolas(
     system: System,
@@ -53,8 +53,7 @@ def find_isolas(
     search: Sequence[int] | None = None,
     seeds: Seeds | None = None,
     max_curves: int = 64,
-    workers: int | None = 1,
-    **options: Unpack[SearchOptions],
+    **options: Unpack[DesignOptions],
 ) -> Isolas:
     """Isolated responses over a design parameter: where each is born, where it merges, the closed branch in between.
 
@@ -86,10 +85,9 @@ def find_isolas(
         How finely that is done.
     max_curves
         Curves of bifurcations after which no more are followed.
-    workers
-        Processes (None: one for each core) among which the responses at the values, and at other levels of the loads,
-        are divided; curves over the parameter and closed branches, which start from each other, are followed in this
-        one. The result is the same bits.
+
+    Responses at the values, and at other levels of the loads, are divided among `workers`; curves over the parameter
+    and closed branches, which start from each other, are followed in this process.
 
     Returns
     -------
@@ -108,7 +106,7 @@ def find_isolas(
     if isinstance(search_at, int):
         search_at = np.linspace(*catalogue.bounds, search_at).tolist()
     check_count("depth", depth, 0)
-    processes = check_workers(workers)
+    processes = check_workers(options.get("workers"))
     other_levels, fine = checked_levels(levels), seeds
     orders = None if search is None else checked_orders(search, 2)
     state = Search(catalogue, sorted(set(search_at)), orders or ())

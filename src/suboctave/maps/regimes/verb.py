@@ -23,7 +23,7 @@ import numpy as np
 
 from suboctave.analysis.branches import continue_branch, frequency_response
 from suboctave.analysis.diagram import Followed, grown_from
-from suboctave.analysis.options import SearchOptions
+from suboctave.analysis.options import DesignOptions
 from suboctave.analysis.subharmonics import Seeds
 from suboctave.bifurcation.bifurcation import Bifurcation, TrackedEvent
 from suboctave.curves.identity import lies_on, mirrored
@@ -66,7 +66,7 @@ _NARROW = 1e-4
 _SAMPLES = (0.1, 0.3, 0.5, 0.7, 0.9)
 
 
-@with_options(SearchOptions)
+@with_options(DesignOptions)
 @timed
 def regime_map(
     system: System,
@@ -84,8 +84,7 @@ def regime_map(
     motions: Sequence[PeriodicOrbit] = (),
     max_curves: int = 64,
     max_slices: int = 64,
-    workers: int | None = 1,
-    **options: Unpack[SearchOptions],
+    **options: Unpack[DesignOptions],
 ) -> RegimeMap:
     """Which stable motions exist, by their periods, over the plane of omega and a design parameter.
 
@@ -111,9 +110,9 @@ def regime_map(
         Motions that are known from elsewhere, as from `RegimeCheck.unknown`: the branches that they lie on are mapped.
     max_curves, max_slices
         Curves, and values of the parameter, after which no more are followed.
-    workers
-        Processes (None: one for each core) among which the branches at values of the parameter, and the search among
-        resonances, are divided; curves over the parameter are followed in this one. The result is the same bits.
+
+    Branches at values of the parameter, and the search among resonances, are divided among `workers`; curves over the
+    parameter are followed in this process.
 
     Returns
     -------
@@ -131,7 +130,7 @@ def regime_map(
     followed = _checked_isolas(isolas, parameter)
     orders, fine, given = checked_orders(search, 1), seeds, _checked_motions(motions, catalogue)
     places = [catalogue.bounds[0] + (i + 0.5) / values * catalogue.span for i in range(values)]
-    processes = check_workers(workers)
+    processes = check_workers(options.get("workers"))
     plan = _Survey(catalogue, 2**depth, resolution, max_slices, processes)
     kept = "the map holds what had been found by then"
     with catalogue.reporting(options.get("progress"), f"regimes over omega and {parameter}", kept):

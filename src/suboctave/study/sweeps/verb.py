@@ -20,7 +20,7 @@ from suboctave.atomic import free_place
 from suboctave.errors import InputError, path_of, shortened
 from suboctave.interruption import Interruption, TimeLimitReached
 from suboctave.model.inputs import check_count, timed
-from suboctave.options import RunOptions, with_options
+from suboctave.options import ParallelOptions, with_options
 from suboctave.progress import Report, reporting
 from suboctave.store.journal import Journal
 from suboctave.study.file import Study, read_study
@@ -39,7 +39,7 @@ _LISTS = {"branch": "event", "diagram": "event", "isolas": "isola", "table": "ro
 _SUFFIX = ".journal"
 
 
-class SweepOptions(RunOptions, total=False):
+class SweepOptions(ParallelOptions, total=False):
     """Options of `sweep`."""
 
     draws: Annotated[Count | None, "How many points are drawn from the distributions."]
@@ -56,7 +56,6 @@ class SweepOptions(RunOptions, total=False):
     ]
     overwrite: Annotated[bool | None, "Replace what is there."]
     resume: Annotated[bool | None, "Go on with what an interrupted or killed sweep left at `path`."]
-    workers: Annotated[Count | None, "Processes, each on one core; default as many as there are cores."]
     scheduler: Annotated[
         str | None,
         'Address of a Dask scheduler whose workers compute instead, "tcp://host:8786" (extra `cluster`).',
