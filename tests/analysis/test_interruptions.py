@@ -12,6 +12,7 @@ import suboctave as so
 from suboctave import interruption
 from suboctave.analysis import phase_resonance as resonance
 from suboctave.continuation.ending import Ending, EndReason, interruption_of, read_endings, sentence
+from suboctave.continuation.notes import Note
 from suboctave.curves import follow as follow_module
 from suboctave.errors import ConvergenceError
 from suboctave.interruption import Interruption
@@ -390,10 +391,10 @@ def test_what_is_in_doubt_of_a_turn_at_a_branch_point_goes_with_the_turn_along_a
     """A closed branch turns back at the branch point that it was begun at: no limit point, and no note on one."""
     made = follow_module.bifurcation_at
 
-    def doubtful(located, a, b, observe, warnings):
-        item = made(located, a, b, observe, warnings)
+    def doubtful(located, a, b, observe, notes):
+        item = made(located, a, b, observe, notes)
         if item.kind == "LP":
-            warnings.append(f"LP near omega = {item.omega:.6g} is in doubt, at F = {item.parameter('F'):.9g}")
+            notes.append(Note(f"is in doubt, at F = {item.parameter('F'):.9g}", "omega", item.omega, item.omega, "LP"))
         return item
 
     monkeypatch.setattr(follow_module, "bifurcation_at", doubtful)

@@ -113,8 +113,7 @@ def test_where_hill_says_nothing_the_monodromy_matrix_stands_in():
     assert all(p.floquet.stands_in != known for p, known in zip(curve.points, said, strict=True))
     (note,) = curve.warnings
     first = curve.omega[~said][0]
-    assert f"between omega = {first:.6g} and 2.9: multipliers of the monodromy matrix there" in note
-    assert f"nothing of {np.count_nonzero(~said)} of {len(curve)} points" in note
+    assert note.startswith(f"between omega = {first:.6g} and 2.9: stability method 'hill' is not applicable")
     assert "highest natural frequency" in note
     assert curve.audit.complete
 
@@ -189,7 +188,7 @@ def test_undamped_motions_are_said_to_be_once():
     system = so.System(1.0, 0.0, 1.0, [so.CubicSpring(0, 1.0)], [so.HarmonicLoad(0, 0.1)])
     curve = so.frequency_response(system, (0.3, 0.5), harmonics=9)
     (note,) = curve.warnings
-    assert "between omega = 0.3 and 0.5 the motion is undamped" in note
+    assert note.startswith("between omega = 0.3 and 0.5: the motion is undamped")
     assert curve.audit.complete
 
 
@@ -204,9 +203,9 @@ def test_another_multiplier_on_the_circle_beside_a_bifurcation():
     for method, said in (("monodromy", True), (None, False)):
         curve = so.frequency_response(system, (1.9, 1.2), harmonics=11, stability=method)
         assert len(curve.bifurcations["LP"]) == 2
+        folds = ", ".join(f"LP at omega = {fold.omega:.9g}" for fold in curve.bifurcations["LP"])
+        assert any(note.startswith(f"{folds}: another multiplier lies") for note in curve.warnings) is said
         for fold in curve.bifurcations["LP"]:
-            begins = f"at the LP at omega = {fold.omega:.9g} another multiplier"
-            assert any(note.startswith(begins) for note in curve.warnings) is said
             # exp(-c T / 2), c = 1e-9
             pair = fold.multipliers[np.abs(fold.multipliers.imag) > 0.1]
             assert np.abs(pair) == pytest.approx(1.0 - 0.5e-9 * fold.orbit.period, abs=1e-7 if said else 1e-12)

@@ -250,7 +250,7 @@ def test_the_nearest_motion_in_the_range_is_said_to_be_no_start(hardening):
     curve = so.frequency_response(system, (2.7, 0.8), harmonics=5, start=start)
     assert curve.omega.max() <= 2.7
     elsewhere = bool(abs(curve.omega[0] - 2.7) > 1e-3)
-    assert any("the curve begins at the nearest one" in note for note in curve.warnings) is elsewhere
+    assert any("the curve begins at the nearest motion" in note for note in curve.warnings) is elsewhere
 
 
 # mass of the light DOF, sliding force and width of its law

@@ -63,7 +63,7 @@ def test_at_a_given_number_of_harmonics_what_they_do_not_resolve_is_open():
     assert curve.open[vague].all()
     assert not curve.stable[vague].any()
     assert f"{np.count_nonzero(curve.open)} not settled" in repr(curve)
-    assert any("do not resolve their multipliers" in u.reason for u in curve.audit.unsettled)
+    assert any("multipliers are not resolved" in u.reason for u in curve.audit.unsettled)
 
 
 @pytest.mark.slow

@@ -141,7 +141,7 @@ def test_multipliers_contradict_a_double_one():
     assert [e.kind for e in curve.bifurcations] == ["CP"]
     assert any("R1" in words and "too few harmonics" in words for words in curve.warnings)
     # nor are some of its points told by their multipliers
-    assert any("the critical one is missed by more than 0.05" in words for words in curve.warnings)
+    assert any("the critical multiplier is off by more than 0.05" in words for words in curve.warnings)
     usual = so.frequency_response(so.library.duffing(c=0.1, F=0.3), (3.0, 0.5)).bifurcations["LP"][0]
     assert so.track(usual, "F", (0.05, 0.5)).warnings == ()
 

@@ -182,7 +182,7 @@ def test_what_cannot_be_solved_is_bracketed_and_says_so(monkeypatch):
     curve, fold = first_fold(oscillator(200.0, 0.05, 0.5), (1.3, 1.0), 9)
     assert fold.uncertainty >= abs(behind(fold)) > 0.0
     assert fold.discontinuous
-    assert any("LP near omega" in note and "grazes there" in note for note in curve.warnings)
+    assert any("LP at omega" in note and "grazes there" in note for note in curve.warnings)
     grazing = curve.grazings[0]
     assert abs(fold.omega - grazing.omega) <= fold.uncertainty
     dataset = curve.to_xarray()

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 import suboctave as so
+from suboctave.continuation.notes import Note, lines
 from suboctave.curves import refine
 from suboctave.curves.events.locate import Singular
 from suboctave.curves.events.monitors import LIMIT_POINT
@@ -27,8 +28,8 @@ def test_a_move_by_more_harmonics_is_measured_in_the_curves_own_parameter(monkey
     wider = HarmonicBasis(2 * state.basis.harmonics)
     monkeypatch.setattr(refine, "choose_harmonics", lambda *_: wider)
     monkeypatch.setattr(refine, "solve_or_behind", lambda *_: replace(solution, state=moved))
-    said: list[str] = []
-    refine.solved_bifurcation(LIMIT_POINT, solution, problem, 0, said)
-    assert len(said) == 1
-    assert said[0].startswith(f"LP near F = {item.parameter('F'):.6g} moves by")
+    notes: list[Note] = []
+    refine.solved_bifurcation(LIMIT_POINT, solution, problem, 0, notes)
+    (line,) = lines(notes)
+    assert line.startswith(f"LP at F = {item.parameter('F'):.9g}: too few harmonics, it moves (")
     assert np.isfinite(item.uncertainty)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import suboctave as so
+from suboctave.continuation.notes import Note, lines
 
 
 def test_arrays(rattling_curve):
@@ -135,8 +136,23 @@ def test_far_too_few_harmonics_are_said_once():
     few, enough, adaptive = (so.frequency_response(system, (0.5, 0.8), harmonics=h) for h in (1, 5, "adaptive"))
     worst = few.truncation.argmax()
     assert few.truncation[worst] > 0.01
-    (note,) = (text for text in few.warnings if "leaves out" in text)
-    assert f"harmonics=1 leaves out about {few.truncation[worst]:.2g} of the motion" in note
-    assert f"omega = {few.omega[worst]:.6g}" in note
+    (note,) = (text for text in few.warnings if "too small" in text)
+    lacking = few.omega[few.truncation > 0.01]
+    assert note == (
+        f"between omega = {lacking.min():.6g} and {lacking.max():.6g}: harmonics=1 is too small, it leaves out up to "
+        f'{few.truncation[worst]:.0%} of the motion. Use harmonics="adaptive" or 3'
+    )
     for curve in (enough, adaptive):
-        assert not [text for text in curve.warnings if "leaves out" in text]
+        assert not [text for text in curve.warnings if "too small" in text]
+
+
+def test_notes_of_one_cause_are_one_line():
+    """Few places are listed, of more their number and range are given; what is of one place alone is left out then."""
+    folds = [Note(f"in doubt (by {i} %). Use more", "omega", 1.0 + i, 1.0 + i, "LP") for i in range(5)]
+    assert lines(folds[:1]) == ["LP at omega = 1: in doubt (by 0 %). Use more"]
+    assert lines(folds[:2]) == ["LP at omega = 1, LP at omega = 2: in doubt. Use more"]
+    other = Note("constant", "omega", 2.0, 2.0 + 1e-7)
+    assert lines([*folds, other, other]) == [
+        "5 LP between omega = 1 and 5: in doubt. Use more",
+        "between omega = 2 and 2.0000001: constant",
+    ]

@@ -20,6 +20,7 @@ from suboctave.bifurcation.bifurcation import Bifurcation, TrackedEvent
 from suboctave.bifurcation.bordered import at_values, branching_equation, null_vectors
 from suboctave.continuation import CurvePoint, NewtonOptions, SteppingOptions
 from suboctave.continuation.linear import length
+from suboctave.continuation.notes import Note
 from suboctave.continuation.problem import Array
 from suboctave.curves.blow_up import DoubledMotions
 from suboctave.curves.events.locate import Singular
@@ -234,17 +235,13 @@ def from_end(curve: MotionProblem, start: Any, run: CurveRun, call: str) -> Trac
     begun = start_point(curve, first, start, run.settings.newton, run.bounds)
     trace = follow(begun, run.ahead, run.bounds, run.settings)
     if abs(begun.parameter - first) > _AT_END * abs(run.ends[1] - first):
-        trace.warnings.append(
-            f"the given start leads to no motion at {name} = {first:.6g}: the curve begins at the nearest one, "
-            f"{name} = {begun.parameter:.6g}"
-        )
+        text = f"the curve begins at the nearest motion, {name} = {begun.parameter:.6g}: the start leads to none here"
+        trace.notes.append(Note(text, name, first, first))
     orbit = trace.points[-1].orbit
     back = len(trace.points) > 1 and (orbit.omega if name == "omega" else orbit.values[name]) == first
     if back and not trace.closed and not trace.interrupted:
-        trace.warnings.append(
-            f"the branch folds back and leaves the range where it began, at {name} = {first:.6g}: what the other end "
-            f"leads to lies on another branch, {call}"
-        )
+        text = f"the branch folds back and leaves the range where it began. For the branch at the other end use {call}"
+        trace.notes.append(Note(text, name, first, first))
     return trace
 
 

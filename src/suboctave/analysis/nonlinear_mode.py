@@ -116,7 +116,7 @@ def nonlinear_mode(
     met = [replace(event, context=context) for event in trace.bifurcations]
     curve = ModeCurve(
         NonlinearMode.name, ("omega",), free, "omega", trace.points, met, [], trace.closed, trace.endings,
-        settings.observe, kept, tuple(trace.warnings),
+        settings.observe, kept, tuple(trace.open_questions),
     )  # fmt: skip
     if (note := _work_of_laws(curve)) is not None:
         curve.warnings += (note,)
@@ -319,6 +319,6 @@ def _work_of_laws(curve: ModeCurve) -> str | None:
     if curve.damped or largest <= _CONSERVATIVE:
         return None
     return (
-        f"the forces do work over a period, as much as a damping ratio of up to {largest:.1e}: they have no potential, "
-        "and the motions are those that this damping would have"
+        f"forces do work over a period, they have no potential. The motions are those of a damping ratio of up to "
+        f"{largest:.1e} in addition. Use damped=True"
     )

@@ -17,6 +17,7 @@ from suboctave.arguments import Positive
 from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.continuation import Event, NewtonOptions, SteppingOptions
 from suboctave.continuation.linear import one_thread
+from suboctave.continuation.notes import Note
 from suboctave.curves.events.formulation import FORMULATIONS, Formulation, formulation_of, written
 from suboctave.curves.junction import Junction
 from suboctave.curves.motion import MotionProblem
@@ -36,6 +37,8 @@ from suboctave.results.branch import Branch
 
 #: truncation estimate from which a fixed number of harmonics is said to be too small: peaks are wrong by per cents
 _FEW = 1e-2
+#: how many times as many are proposed then: what harmonics leave out of a motion with contacts falls like their cube
+_MORE = 3
 
 
 class SearchOptions(RunOptions, total=False):
@@ -229,17 +232,21 @@ class CurveRun:
         if self.settings.report is not None:
             self.settings.report.report(share, where)
 
-    def _truncated(self, trace: Trace) -> list[str]:
-        """One sentence where a given number of harmonics is far too small somewhere on the curve."""
-        if isinstance(self.harmonics, AdaptiveHarmonics) or not trace.points:
+    def _truncated(self, trace: Trace) -> list[Note]:
+        """A note where a given number of harmonics is far too small."""
+        if isinstance(self.harmonics, AdaptiveHarmonics):
             return []
-        worst = max((point.orbit for point in trace.points), key=lambda orbit: orbit.truncation)
-        if not worst.truncation > _FEW:
+        lacking = [point.orbit for point in trace.points if point.orbit.truncation > _FEW]
+        if not lacking:
             return []
-        value = worst.omega if self.name == "omega" else worst.values[self.name]
+        worst = max(orbit.truncation for orbit in lacking)
+        values = [orbit.omega if self.name == "omega" else orbit.values[self.name] for orbit in lacking]
         return [
-            f"harmonics={self.harmonics} leaves out about {worst.truncation:.2g} of the motion at {self.name} = "
-            f'{value:.6g}, the most on this curve: give harmonics="adaptive", or a larger number'
+            Note(
+                f"harmonics={self.harmonics} is too small, it leaves out up to {worst:.0%} of the motion. Use "
+                f'harmonics="adaptive" or {_MORE * self.harmonics}',
+                *(self.name, min(values), max(values)),
+            )
         ]
 
     def branch(self, trace: Trace) -> Branch:
@@ -247,6 +254,7 @@ class CurveRun:
         options = options_of(self.settings, self.harmonics, {self.name: self.ends})
         with one_thread():
             trace = with_verdicts(trace, self.settings.stability, self.name)
+        trace = replace(trace, notes=[*self._truncated(trace), *trace.notes])
         context = {"system": self.system, "parameter": self.name, **options}
         bifurcations, events = (
             [replace(b, context=context) for b in items] for items in (trace.bifurcations, trace.events)
@@ -254,5 +262,5 @@ class CurveRun:
         met = (None if item is None else Junction.of(item) for item in (trace.departs, trace.arrives))
         return Branch(
             self.system, self.name, trace.points, bifurcations, events, trace.closed, trace.endings,
-            self.settings.observe, options, (*trace.sentences, *self._truncated(trace)), trace.audit, *met,
+            self.settings.observe, options, tuple(trace.open_questions), trace.audit, *met,
         )  # fmt: skip

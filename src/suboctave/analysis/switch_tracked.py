@@ -143,7 +143,7 @@ def switch_tracked(
     departs = None if trace.departs is None else Junction.of(trace.departs)
     return tracked_class(kept)(
         item.curve, item.names, orbit.system, name, trace.points, met, [], trace.closed, trace.endings,
-        settings.observe, kept, tuple(trace.warnings), departs=departs,
+        settings.observe, kept, tuple(trace.open_questions), departs=departs,
     )  # fmt: skip
 
 

@@ -32,6 +32,7 @@ from suboctave.bifurcation.bordered import null_vectors, transversality
 from suboctave.continuation import CurvePoint, NewtonOptions, SteppingOptions
 from suboctave.continuation.linear import length, one_thread
 from suboctave.continuation.newton import correct
+from suboctave.continuation.notes import Note
 from suboctave.continuation.point import point_ahead
 from suboctave.curves.events.formulation import BorderedSystem
 from suboctave.curves.junction import repeats_earlier
@@ -69,7 +70,7 @@ Range = tuple[float, float]
 #: a curve of bifurcations is drawn by its points, and those in its turns cost little
 _STEPPING = SteppingOptions(angle=0.15, growth=4.0)
 #: what a curve of multiple bifurcations says
-_MULTIPLE = "along multiple bifurcations extrema are located, but points of codimension two are not looked for"
+_MULTIPLE = Note("extrema are located along multiple bifurcations, points of codimension two are not")
 
 
 @with_options(TrackOptions)
@@ -151,7 +152,7 @@ def track(
         first, last = given[names[-1]]
         trace = _both_ways(start, ranges, math.copysign(1.0, last - first), settings)
     if item.multiplicity > 1:
-        trace.warnings.append(_MULTIPLE)
+        trace.notes.append(_MULTIPLE)
     kept = options_of(settings, wanted, given)
     return _branch(item, names, turning, trace, settings, kept)
 
@@ -186,7 +187,7 @@ def _branch(
     met = [replace(event, context=context) for event in trace.bifurcations]
     return tracked_class(options)(
         kind, names, system, names[-1], trace.points, met, [], trace.closed, trace.endings, settings.observe, options,
-        tuple(trace.warnings), turning=turning,
+        tuple(trace.open_questions), turning=turning,
     )  # fmt: skip
 
 

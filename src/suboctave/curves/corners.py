@@ -18,6 +18,7 @@ from suboctave.bifurcation.gaps import GapExtrema, gap_extrema
 from suboctave.continuation import CurvePoint, NewtonOptions
 from suboctave.continuation.linear import length
 from suboctave.continuation.newton import correct
+from suboctave.continuation.notes import Note
 from suboctave.continuation.point import make_point
 from suboctave.curves.events.grazings import height_gradient, nearest_extremum
 from suboctave.curves.sample import Sample
@@ -39,8 +40,8 @@ _HEIGHTS, _NEAR = (1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3), 5e-3
 
 def beyond_corner(
     last: Sample, before: Iterable[PeriodicOrbit], newton: NewtonOptions
-) -> tuple[CurvePoint | None, str] | None:
-    """A point behind a corner and what to say of it; no point where none is found, None where no contact grazes.
+) -> tuple[CurvePoint | None, Note] | None:
+    """A point behind a corner and a note on it; no point where none is found, None where no contact grazes.
 
     `before`: the motions up to there, the last first.
     """
@@ -50,7 +51,8 @@ def beyond_corner(
     gap, at, height = grazing
     label, clear = last.state.local(gap.element).element.label, _CLEAR * float(np.abs(last.state.x).max())
     coming = next((h for h in (_height(orbit, gap, at) for orbit in before) if abs(h) > clear), height)
-    point, curve, where = last.point, last.curve, last.where
+    point, curve = last.point, last.curve
+    here = curve.name, point.parameter, point.parameter, "", last.where
     by_x, rates = height_gradient(last.state, gap.element, gap.index, float(gap.tau[at]), curve.names)
     row = curve.join(by_x, rates, np.zeros(curve.augmentation.extras)) / point.weights
     size = length(row)
@@ -71,10 +73,10 @@ def beyond_corner(
                 # behind a corner the extremum moves on from the gap; what led there may be most of the way
                 ahead = math.copysign(1.0, rise) * row / point.weights
                 new = make_point(solved, ahead, point.arclength + length(away))
-                return new, f"the curve has a corner at {where}, where {label} grazes"
+                return new, Note(f"the curve has a corner there, {label} grazes", *here)
         except ConvergenceError:
             continue
-    return None, f"{label} grazes at {where}: the equations are not smooth there"
+    return None, Note(f"{label} grazes, the equations are not smooth there", *here)
 
 
 def grazes(point: CurvePoint) -> bool:

@@ -17,6 +17,7 @@ from suboctave.continuation.ending import Ending, EndReason
 from suboctave.continuation.events import Bracket
 from suboctave.continuation.march import Arrival
 from suboctave.continuation.newton import NewtonOptions
+from suboctave.continuation.notes import Note
 from suboctave.continuation.point import point_ahead, point_between, solved_again
 from suboctave.continuation.problem import Curve
 from suboctave.curves.corners import beyond_corner
@@ -257,7 +258,7 @@ class _Follower(Driver):
         if met.doubt is not None:
             self._guard.audit = self._guard.audit.in_doubt(replace(met.doubt, arclength=(arclength, arclength)))
         kind, settings = multiple(PERIOD_DOUBLING, met.multiplicity), self.settings
-        item = solved_bifurcation(kind, met.solution, met.parent, settings.observe, self.trace.warnings, arclength)
+        item = solved_bifurcation(kind, met.solution, met.parent, settings.observe, self.trace.notes, arclength)
         return replace(item, multiplicity=met.multiplicity)
 
     def _solved_again(self, sample: Sample, next_one: Sample) -> Sample:
@@ -324,10 +325,10 @@ class _Follower(Driver):
             self._keeper(self.trace)
 
     def _bifurcation(self, located: Located, a: Sample, b: Sample) -> Bifurcation | None:
-        sentences: list[str] = []
-        item = bifurcation_at(located, a, b, self.settings.observe, sentences)
+        notes: list[Note] = []
+        item = bifurcation_at(located, a, b, self.settings.observe, notes)
         if item is not None:
-            self.trace.doubts += [(item.orbit, text) for text in sentences]
+            self.trace.doubts += [(item.orbit, note) for note in notes]
         return item
 
     def _bifurcations(self, located: Located, a: Sample, b: Sample) -> list[Bifurcation]:
@@ -335,7 +336,7 @@ class _Follower(Driver):
         if located.kind.multiplicity == 1:
             item = self._bifurcation(located, a, b)
             return [] if item is None else [item]
-        return multiple_at(located, a, b, self.settings.observe, self.trace.warnings)
+        return multiple_at(located, a, b, self.settings.observe, self.trace.notes)
 
     def _look_behind(self, inside: list[Sample]) -> None:
         """What the harmonics solved for do not show of a step: hidden pairs, and open verdicts between its points."""
@@ -510,7 +511,8 @@ class _Follower(Driver):
             bracket = Bracket(a.point, b.point, values, lambda p: self._event_value(event, self._sample(p)), newton)
             point = bracket.points[bracket.zero()]
         except ConvergenceError as failure:
-            self.trace.warnings.append(f"event {event.name!r}: {failure}")
+            here = a.point.parameter, b.point.parameter
+            self.trace.notes.append(Note(f"not located: {failure}", a.curve.name, *here, event.name))
             return None
         sample = self._sample(point)
         known = sample.orbit.residual, sample.orbit.amplitude(self.settings.observe), sample.curve.name

@@ -106,7 +106,7 @@ MERGED = 1e-6
 #: way in the scaled parameter that rounding may account for
 _STILL = 1e-10
 #: what a branch says where it could not look closer
-UNSEEN = "close to a bifurcation the motions change so fast that something may happen unseen"
+UNSEEN = "motions change too fast beside the bifurcation, events may be missing"
 
 
 @dataclass(frozen=True)

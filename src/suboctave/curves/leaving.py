@@ -22,6 +22,7 @@ from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.bifurcation.bordered import doubled_direction
 from suboctave.continuation.linear import length
 from suboctave.continuation.newton import NewtonOptions, correct
+from suboctave.continuation.notes import Note
 from suboctave.continuation.point import make_point
 from suboctave.curves.events.monitors import Located, Multiple
 from suboctave.curves.junction import MERGED, Beside
@@ -49,11 +50,11 @@ _FAN = 12
 _ONE, _ALIKE, _INDEPENDENT = 0.999, 1e-4, 0.2
 
 
-def multiple_at(located: Located, a: Sample, b: Sample, observe: int, warnings: list[str]) -> list[Bifurcation]:
+def multiple_at(located: Located, a: Sample, b: Sample, observe: int, notes: list[Note]) -> list[Bifurcation]:
     """The bifurcations that fall together between two neighbours, as many as there are; none where they are not found
     with the harmonics that events ask for.
     """
-    item = bifurcation_at(located, a, b, observe, warnings)
+    item = bifurcation_at(located, a, b, observe, notes)
     if item is None or item.null_vectors is None:
         return []
     kind = located.kind

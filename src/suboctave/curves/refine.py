@@ -11,6 +11,7 @@ from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.bifurcation.bordered import branching_equation
 from suboctave.continuation import NewtonOptions
 from suboctave.continuation.linear import distance, length
+from suboctave.continuation.notes import Note
 from suboctave.continuation.point import solved_again
 from suboctave.curves.events.beyond import lacks_harmonics, resolved, zero_beside
 from suboctave.curves.events.layer import (
@@ -58,11 +59,11 @@ _MORE = 1.2
 _STILL = 1e-5
 
 
-def bifurcation_at(located: Located, a: Sample, b: Sample, observe: int, warnings: list[str]) -> Bifurcation | None:
+def bifurcation_at(located: Located, a: Sample, b: Sample, observe: int, notes: list[Note]) -> Bifurcation | None:
     """The bifurcation located between two neighbours: solved again with the harmonics that events ask for, labelled.
 
     None if the change of its test is all that is known. Beside the grazing of an exact contact, where Newton's method
-    has no chance, that is enough: it is noted in `warnings`, as is what was not found again.
+    has no chance, that is enough: it is noted in `notes`, as is what was not found again.
     """
     arclength = a.point.arclength + located.fraction * (b.point.arclength - a.point.arclength)
     curve = b.curve
@@ -77,7 +78,7 @@ def bifurcation_at(located: Located, a: Sample, b: Sample, observe: int, warning
         # harmonics may move it beyond the ends of a short step, where it may also be another one
         solution = behind if own else _with_more_harmonics(located, a, b) or behind
     if solution is None:
-        seen = _seen_with_more(located, curve, observe, arclength, warnings)
+        seen = _seen_with_more(located, curve, observe, arclength, notes)
         if seen is not None:
             return seen
         sample, width, beside = located.sample, located.width, grazing_beside(guess)
@@ -96,7 +97,7 @@ def bifurcation_at(located: Located, a: Sample, b: Sample, observe: int, warning
         # what is bracketed is the change of a test; where a contact grazes, harmonics matter beyond that
         width = width if beside is None else max(width, abs(guess.parameter - beside.parameter))
         where, orbit = curve.where(sample.point.u), sample.orbit
-        warnings.append(f"{located.kind.name} near {where} could only be bracketed, to +- {width:.1e}: {why}")
+        notes.append(_bracketed(located.kind, curve, sample.point.parameter, where, width, why))
         return Bifurcation(
             located.kind.name,
             orbit,
@@ -109,10 +110,10 @@ def bifurcation_at(located: Located, a: Sample, b: Sample, observe: int, warning
             contact=beside,
         )
     unit = curve.unit(located.sample.point.weights)
-    item = solved_bifurcation(located.kind, solution, curve, observe, warnings, arclength, unit, (a, b))
+    item = solved_bifurcation(located.kind, solution, curve, observe, notes, arclength, unit, (a, b))
     if located.width > item.uncertainty:
         item = replace(item, uncertainty=located.width)
-    known = with_what_harmonics_move(located, item, a, b, warnings)
+    known = with_what_harmonics_move(located, item, a, b, notes)
     if known is None:
         return None
     item = known
@@ -123,8 +124,14 @@ def bifurcation_at(located: Located, a: Sample, b: Sample, observe: int, warning
     return replace(item, tangent=tuple(curve.with_balance(item.orbit.balance).transfer(tangent, curve).tolist()))
 
 
+def _bracketed(kind: BifurcationKind, curve: MotionProblem, value: float, where: str, width: float, why: str) -> Note:
+    """A note on a bifurcation of which a bracket is known, and no solution."""
+    text = f"bracketed (to +- {width:.1e}), not solved for: {why}"
+    return Note(text, curve.name, value, value, kind.name, where)
+
+
 def _seen_with_more(
-    located: Located, curve: MotionProblem, observe: int, arclength: float, warnings: list[str]
+    located: Located, curve: MotionProblem, observe: int, arclength: float, notes: list[Note]
 ) -> Bifurcation | None:
     """A period doubling between motions with more harmonics that fewer have too far away: as a motion with more; None
     if it is none.
@@ -145,13 +152,13 @@ def _seen_with_more(
     )
     where = f"{curve.name} = {found.motion.parameter:.6g}"
     why = "its system needs more harmonics than it is solved with"
-    warnings.append(f"{kind.name} near {where} could only be bracketed, to +- {width:.1e}: {why}")
+    notes.append(_bracketed(kind, curve, found.motion.parameter, where, width, why))
     known = orbit.amplitude(observe), curve.name
     return Bifurcation(kind.name, orbit, found.floquet, orbit.residual, *known, uncertainty=width, arclength=arclength)
 
 
 def with_what_harmonics_move(
-    located: Located, item: Bifurcation, a: Sample, b: Sample, warnings: list[str]
+    located: Located, item: Bifurcation, a: Sample, b: Sample, notes: list[Note]
 ) -> Bifurcation | None:
     """A bifurcation solved for between two samples with the uncertainty that the harmonics left out make, where they
     are too few: the distance from where it lies with more of them. None if there is none with more.
@@ -198,7 +205,7 @@ def solved_bifurcation(
     solution: Singular,
     curve: MotionProblem,
     observe: int,
-    warnings: list[str],
+    notes: list[Note],
     arclength: float = 0.0,
     size: float = 0.0,
     neighbours: tuple[Sample, Sample] | None = None,
@@ -207,7 +214,7 @@ def solved_bifurcation(
     samples it was located between.
     """
     own = None if neighbours is None or neighbours[0] is neighbours[1] else neighbours
-    solution, coarser = _refined(kind, solution, curve, warnings, size, own)
+    solution, coarser = _refined(kind, solution, curve, notes, size, own)
     guess = _guess_from(solution, curve, size)
     state = solution.state
     layer = layer_of(kind, solution, guess)
@@ -289,7 +296,7 @@ def _refined(
     kind: BifurcationKind,
     solution: Singular,
     curve: MotionProblem,
-    warnings: list[str],
+    notes: list[Note],
     size: float,
     neighbours: tuple[Sample, Sample] | None,
 ) -> tuple[Singular, tuple[int, float] | None]:
@@ -324,17 +331,19 @@ def _refined(
                     raise ConvergenceError(f"it leads to another one, at {curve.name} = {there:.6g}")
                 better = behind or better
         except ConvergenceError as failure:
-            warnings.append(
-                f"{kind.name} near {curve.name} = {here:.6g} was located with {state.basis.harmonics} "
-                f"harmonics; with {basis.harmonics} it was not found again ({failure})"
+            text = (
+                f"located with few harmonics ({state.basis.harmonics}), not found again with more ({basis.harmonics}: "
+                f"{failure}). Use more harmonics for the whole curve"
             )
+            notes.append(Note(text, curve.name, here, here, kind.name))
             break
         moved = abs(_guess_from(better, curve).parameter - here) / max(abs(here), curve.span)
         if moved > _FAR:
-            warnings.append(
-                f"{kind.name} near {curve.name} = {here:.6g} moves by {moved:.1%} with {basis.harmonics} "
-                f"harmonics instead of {state.basis.harmonics}: too few harmonics to trust it"
+            text = (
+                f"too few harmonics, it moves ({moved:.1%}) with more ({basis.harmonics} instead of "
+                f"{state.basis.harmonics}). Use more harmonics for the whole curve"
             )
+            notes.append(Note(text, curve.name, here, here, kind.name))
             break
         coarser = state.basis.harmonics, here
         solution = better

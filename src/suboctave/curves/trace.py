@@ -12,6 +12,7 @@ from suboctave.arguments import checked
 from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.continuation import Event, NewtonOptions, SteppingOptions
 from suboctave.continuation.ending import Ending, EndReason, interruption_of
+from suboctave.continuation.notes import Note, lines
 from suboctave.curves.events.formulation import BORDERED, Formulation
 from suboctave.errors import InputError, suggest
 from suboctave.floquet.methods import StabilityMethod
@@ -148,10 +149,18 @@ def joined(stretches: Iterable[Unsettled]) -> list[Unsettled]:
         if last is None or item.arclength[0] - last.arclength[1] > max(PLACE, last.length, item.length):
             result.append(item)
             continue
-        reasons = last.reason if item.reason in last.reason else f"{last.reason}; {item.reason}"
+        known = set(last.reason.split("; "))
+        reasons = "; ".join([last.reason, *(one for one in item.reason.split("; ") if one not in known)])
         end = max(last, item, key=lambda u: u.arclength[1])
         result[-1] = replace(last, last=end.last, arclength=(last.arclength[0], end.arclength[1]), reason=reasons)
     return result
+
+
+def stretches_in_doubt(stretches: Iterable[Unsettled], remedy: str) -> list[Note]:
+    """A note for each reason of each stretch."""
+    return [
+        Note(f"{reason}. {remedy}", u.parameter, u.first, u.last) for u in stretches for reason in u.reason.split("; ")
+    ]
 
 
 @dataclass(frozen=True)
@@ -219,7 +228,7 @@ class Audit:
         return text + "\n  ".join([f"{len(self.unsettled)} unsettled:", *map(str, self.unsettled)])
 
 
-_REMEDY = "a smaller max_step or more harmonics may settle it, or shooting (so.verify)"
+_REMEDY = "Use more harmonics, a smaller max_step, or so.verify"
 
 
 @dataclass(frozen=True)
@@ -251,7 +260,7 @@ class Trace:
     open
         Motions between its points whose verdict is open.
     doubts
-        Of located bifurcations: the motion there, and a sentence.
+        Of located bifurcations: the motion there, and a note.
     endings
         Why it ends at its first and at its last point.
     departs, arrives
@@ -262,8 +271,8 @@ class Trace:
     open: list[BranchPoint] = field(default_factory=list)
     bifurcations: list[Bifurcation] = field(default_factory=list)
     events: list[Bifurcation] = field(default_factory=list)
-    warnings: list[str] = field(default_factory=list)
-    doubts: list[tuple[PeriodicOrbit, str]] = field(default_factory=list)
+    notes: list[Note] = field(default_factory=list)
+    doubts: list[tuple[PeriodicOrbit, Note]] = field(default_factory=list)
     audit: Audit = field(default_factory=Audit)
     closed: bool = False
     endings: tuple[Ending, Ending] = (Ending(EndReason.START), Ending(EndReason.NOT_STARTED))
@@ -276,12 +285,11 @@ class Trace:
         return interruption_of(self.endings) is not None
 
     @property
-    def sentences(self) -> list[str]:
-        """What is to be said of it: a stretch in doubt in one line, doubts of bifurcations that are listed."""
+    def open_questions(self) -> list[str]:
+        """Its notes, those on bifurcations that are listed, and stretches in doubt, in a line for each cause."""
         listed = {id(item.orbit) for item in self.bifurcations}
-        doubts = (text for orbit, text in self.doubts if id(orbit) in listed)
-        stretches = (f"{u}; {_REMEDY}" for u in self.audit.unsettled)
-        return [*self.warnings, *doubts, *stretches]
+        doubts = [note for orbit, note in self.doubts if id(orbit) in listed]
+        return lines([*self.notes, *doubts, *stretches_in_doubt(self.audit.unsettled, _REMEDY)])
 
     def ends(self, ending: Ending) -> None:
         """Why it ends at its last point."""
@@ -308,7 +316,7 @@ class Trace:
             walked(self.open, other.open),
             joined(self.bifurcations, other.bifurcations),
             joined(self.events, events),
-            self.warnings + other.warnings,
+            self.notes + other.notes,
             self.doubts + other.doubts,
             self.audit.reversed_before(other.audit, whole, gap or 0.0),
             other.closed,

@@ -19,6 +19,7 @@ from suboctave.bifurcation.bifurcation import CONTACT_KINDS, Bifurcation
 from suboctave.bifurcation.measures import in_doubt
 from suboctave.continuation.ending import Ending
 from suboctave.continuation.linear import Factor
+from suboctave.continuation.notes import Note
 from suboctave.curves.trace import BranchPoint, Trace, Unsettled, joined
 from suboctave.floquet.methods import StabilityMethod
 from suboctave.floquet.result import NO_VERDICT, FloquetResult, written
@@ -30,7 +31,7 @@ from suboctave.kinds import KINDS
 
 #: distance, in scaled arclength and of multipliers, up to which bifurcations fall together
 _AT_ONCE = 1e-5
-_UNRESOLVED = "stability is open: the harmonics that the motions may have do not resolve their multipliers"
+_UNRESOLVED = "stability is open: multipliers are not resolved with these harmonics"
 #: motions in a row that witnesses could not settle, after which they are not asked until a verdict is clear again
 _PATIENCE = 3
 
@@ -77,7 +78,7 @@ def with_verdicts(trace: Trace, method: StabilityMethod, name: str) -> Trace:
         points=points,
         bifurcations=bifurcations,
         events=events,
-        warnings=[*trace.warnings, *notes],
+        notes=[*trace.notes, *notes],
         audit=replace(trace.audit, unsettled=tuple(joined((*trace.audit.unsettled, *unsettled)))),
     )
 
@@ -149,8 +150,8 @@ def _others_open(item: Bifurcation) -> np.ndarray:
     return within
 
 
-def _doubt_beside(item: Bifurcation, bifurcations: Sequence[Bifurcation]) -> str | None:
-    """A sentence if a multiplier besides the critical one leaves open what is stable on either side, and none of the
+def _doubt_beside(item: Bifurcation, bifurcations: Sequence[Bifurcation]) -> Note | None:
+    """A note if a multiplier besides the critical one leaves open what is stable on either side, and none of the
     bifurcations that fall together with it is why.
     """
     within = _others_open(item)
@@ -164,10 +165,11 @@ def _doubt_beside(item: Bifurcation, bifurcations: Sequence[Bifurcation]) -> str
         return None
     i = int(np.argmax(within))
     mu, error = item.multipliers[i], item.floquet.errors[i]
-    where = f"{item.parameter_name} = {item.parameter(item.parameter_name):.9g}"
-    return (
-        f"at the {item.kind} at {where} another multiplier, {written(mu, error)}, lies within its error of the unit "
-        "circle: which motions beside it are stable is open"
+    value = item.parameter(item.parameter_name)
+    return Note(
+        f"another multiplier ({written(mu, error)}) lies within its error of the unit circle: stability on its two "
+        "sides is open. Use more harmonics or so.verify",
+        *(item.parameter_name, value, value, item.kind),
     )
 
 
@@ -199,25 +201,24 @@ def _explained(result: FloquetResult, reach: tuple[float, float], bifurcations: 
     return bool(explained.all())
 
 
-def _stretches(points: Sequence[BranchPoint], open_ones: list[int], name: str) -> tuple[list[Unsettled], list[str]]:
-    """What stayed open, as stretches between clear verdicts, and sentences on them."""
+def _stretches(points: Sequence[BranchPoint], open_ones: list[int], name: str) -> tuple[list[Unsettled], list[Note]]:
+    """What stayed open, as stretches between clear verdicts, and notes on them."""
     stretches: list[Unsettled] = []
-    notes: list[str] = []
+    notes: list[Note] = []
     for first, last in _runs(open_ones):
         a, b = points[max(first - 1, 0)], points[min(last + 1, len(points) - 1)]
         result = points[first].floquet
         # at a point where a pair lies on the circle the product may be one by chance
         if all(point.floquet.undamped for point in (a, points[first], b)):
-            notes.append(
-                f"between {name} = {_value(a, name):.9g} and {_value(b, name):.9g} the motion is undamped: its "
-                "multipliers stay on the unit circle, and nothing settles which side of it they are on"
-            )
+            text = "the motion is undamped: its multipliers stay on the unit circle, stability is open. Add damping"
+            notes.append(Note(text, name, _value(a, name), _value(b, name)))
             continue
         if any(points[i].floquet.vague for i in range(first, last + 1)):
             stretches.append(_stretch(a, b, name, _UNRESOLVED))
             continue
-        words = f"{_worst(result)} by {result.method}, lies within its error of the unit circle"
-        stretches.append(_stretch(a, b, name, f"stability is open: a multiplier, {words}"))
+        worst = f"{_worst(result)} by {result.method}"
+        reason = f"stability is open: a multiplier ({worst}) lies within its error of the unit circle"
+        stretches.append(_stretch(a, b, name, reason))
     return stretches, notes
 
 
@@ -231,39 +232,35 @@ def _stretch(a: BranchPoint, b: BranchPoint, name: str, reason: str) -> Unsettle
     return Unsettled(name, _value(a, name), _value(b, name), (a.arclength, b.arclength), reason)
 
 
-def _standing(points: Sequence[BranchPoint], name: str) -> list[str]:
-    """One sentence for each piece along which the parameter stands still: a linear equation has a multiple of every
+def _standing(points: Sequence[BranchPoint], name: str) -> list[Note]:
+    """A note for each piece along which the parameter stands still: a linear equation has a multiple of every
     motion, up to the one whose contacts begin or cease to touch.
     """
     notes = []
     for first, last in _runs([i for i, point in enumerate(points) if point.still]):
         here = _value(points[first], name)
         around = [_value(points[i], name) - here for i in (first - 1, last + 1) if 0 <= i < len(points)]
-        turns = ", and the branch turns back across it" if len(around) > 1 and around[0] * around[1] > 0.0 else ""
-        notes.append(
-            f"{name} stands still at {here:.9g} along a piece of the branch: motions of every size between those at "
-            f"its ends exist there, as of linear equations, with a multiplier that stays +1; no limit point lies on "
-            f"it{turns}"
-        )
+        turns = "; the branch turns back across it" if len(around) > 1 and around[0] * around[1] > 0.0 else ""
+        text = f"constant along a piece of the branch, on which motions differ in size and a multiplier is +1{turns}"
+        notes.append(Note(text, name, here, here))
     return notes
 
 
-def _at_most(points: Sequence[BranchPoint], name: str) -> list[str]:
-    """One sentence where the most harmonics that a rule allows leave out more of motions than its tolerance."""
+def _at_most(points: Sequence[BranchPoint], name: str) -> list[Note]:
+    """A note where the most harmonics that a rule allows leave out more of motions than its tolerance."""
     lacking = [point for point in points if _lacks_harmonics(point.orbit)]
     if not lacking:
         return []
     first, last, worst = lacking[0], lacking[-1], max((p.orbit for p in lacking), key=lambda orbit: orbit.truncation)
     most, rule = worst.basis.harmonics // worst.basis.nu, worst.adaptive
     assert rule is not None
-    where = f"{name} = {_value(first, name):.6g}"
-    where = f"between {where} and {_value(last, name):.6g}" if first is not last else f"at {where}"
     more = 2 * most + 1
-    way = f"harmonics=so.AdaptiveHarmonics(maximum={more}) takes more, at some four times the time a point"
-    return [
-        f"{where} the most harmonics, {most}, leave out up to {worst.truncation:.0e} of the motion (tolerance "
-        f"{rule.tolerance:.0e}): {way if more <= MOST_HARMONICS else 'so.verify asks shooting'}"
-    ]
+    way = f"Use harmonics=so.AdaptiveHarmonics(maximum={more}), four times the time a point, or so.verify"
+    text = (
+        f"{most} harmonics leave out up to {worst.truncation:.0e} of the motion (tolerance {rule.tolerance:.0e}). "
+        f"{way if more <= MOST_HARMONICS else 'Use so.verify'}"
+    )
+    return [Note(text, name, _value(first, name), _value(last, name))]
 
 
 def _lacks_harmonics(orbit: PeriodicOrbit) -> bool:
@@ -273,20 +270,16 @@ def _lacks_harmonics(orbit: PeriodicOrbit) -> bool:
     return orbit.basis.harmonics >= rule.usual * orbit.basis.nu and orbit.truncation > rule.tolerance
 
 
-def _replaced(points: Sequence[BranchPoint], method: StabilityMethod, name: str) -> list[str]:
-    """One sentence where the monodromy matrix had to stand in for the method that was asked for."""
+def _replaced(points: Sequence[BranchPoint], method: StabilityMethod, name: str) -> list[Note]:
+    """A note where the monodromy matrix had to be taken for the method that was asked for."""
     places = [i for i, p in enumerate(points) if p.floquet.stands_in]
     if not places:
         return []
-    ranges = []
-    for first, last in _runs(places):
-        a, b = _value(points[first], name), _value(points[last], name)
-        ranges.append(f"between {name} = {a:.6g} and {b:.6g}" if first < last else f"at {name} = {a:.6g}")
-    return [
-        f"stability method {method.name!r} says nothing of {len(places)} of {len(points)} points, "
-        f"{', '.join(ranges)}: multipliers of the monodromy matrix there. The first time: "
+    text = (
+        f"stability method {method.name!r} is not applicable, multipliers are those of the monodromy matrix. "
         f"{points[places[0]].floquet.note}"
-    ]
+    )
+    return [Note(text, name, _value(points[a], name), _value(points[b], name)) for a, b in _runs(places)]
 
 
 def _between(
@@ -305,8 +298,9 @@ def _between(
         last += 1
     if _explained(result, _reach(points, first, last, closed), bifurcations):
         return None
-    words = f"{_worst(result)} at {name} = {_value(probe, name):.9g}, comes within its error of the unit circle"
-    return _stretch(points[low], points[high], name, f"a multiplier, {words} and may pass it")
+    words = f"{_worst(result)} at {name} = {_value(probe, name):.9g}"
+    reason = f"a multiplier ({words}) comes within its error of the unit circle and may pass it"
+    return _stretch(points[low], points[high], name, reason)
 
 
 def _runs(places: Sequence[int]) -> Iterator[tuple[int, int]]:

@@ -20,6 +20,7 @@ from suboctave.bifurcation.gaps import GrazingContact, level_of
 from suboctave.continuation.events import Bracket
 from suboctave.continuation.linear import Factor, length
 from suboctave.continuation.newton import NewtonOptions, correct, null_row
+from suboctave.continuation.notes import Note
 from suboctave.continuation.point import (
     CurvePoint,
     crossing_matrix,
@@ -200,7 +201,7 @@ def events_between(
     samples: list[Sample],
     tests: tuple[CurveTest, ...],
     newton: NewtonOptions,
-    warnings: list[str],
+    notes: list[Note],
     crossing: LocatedEvent | None = None,
 ) -> list[LocatedEvent]:
     """Every event in a step, between its samples in order (both ends included, no test changing twice in between);
@@ -222,15 +223,13 @@ def events_between(
         except ConvergenceError as failure:
             turn = _turned(test, a, b)
             events += [] if turn is None else [turn]
-            warnings += [f"{test.kind} near {b.where}: {failure}"] if turn is None else []
+            notes += [noted(test.kind, b, f"not located: {failure}")] if turn is None else []
     near = SAME * (samples[-1].place - samples[0].place)
     crossings = [item for item in events if isinstance(item.test, CurvesCross)]
     repeated = _repeated(crossings, near)
     if repeated:
-        warnings.append(
-            f"near {repeated[0].sample.where} several curves all but cross in one place, as at the tip of a tongue of "
-            f"high order: one BP is listed for {1 + len(repeated)}"
-        )
+        text = f"one BP is listed for {1 + len(repeated)}: curves nearly cross in one place, at the tip of a tongue"
+        notes.append(noted("BP", repeated[0].sample, text))
     events = [item for item in events if not any(item is r for r in repeated)]
     return sorted(_genuine(events, samples[-1].curve, near), key=lambda item: item.sample.place)
 
@@ -393,7 +392,7 @@ def _finer(sample: Sample) -> HarmonicBasis | None:
     return basis if basis.harmonics > curve.balance.basis.harmonics else None
 
 
-def refined(event: LocatedEvent, newton: NewtonOptions, warnings: list[str]) -> LocatedEvent:
+def refined(event: LocatedEvent, newton: NewtonOptions, notes: list[Note]) -> LocatedEvent:
     """An event located again with the harmonics that events ask for."""
     sample = event.sample
     # what could not be located is not found with more
@@ -404,20 +403,20 @@ def refined(event: LocatedEvent, newton: NewtonOptions, warnings: list[str]) -> 
         try:
             sample = _with_more(event, sample, basis, newton)
         except ConvergenceError as failure:
-            words = _lost(event, sample, basis, failure)
+            note = _lost(event, sample, basis, failure)
             if sample is event.sample and event.rough is not None:
                 try:
                     sample = Sample(event.rough.points[event.rough.zero(_RESOLVED)])
                 except ConvergenceError as again:
-                    words += f", nor more closely without these ({again})"
+                    note = replace(note, text=f"{note.text}. Without these: {again}")
                     event = replace(event, off=_ROUGH * event.rough.way)
-            warnings.append(words)
+            notes.append(note)
             break
     event = event if sample is event.sample else replace(event, sample=sample)
-    return _settled(event, newton, warnings) if event.test.of_third_order and event.off == 0.0 else event
+    return _settled(event, newton, notes) if event.test.of_third_order and event.off == 0.0 else event
 
 
-def _settled(event: LocatedEvent, newton: NewtonOptions, warnings: list[str]) -> LocatedEvent:
+def _settled(event: LocatedEvent, newton: NewtonOptions, notes: list[Note]) -> LocatedEvent:
     """An event that a coefficient of third order tells of, with more harmonics until it stays, as far as they go: from
     contacts these converge like 1 / H, and unevenly. Else the larger of the last two moves is how far it may lie off.
     """
@@ -437,7 +436,7 @@ def _settled(event: LocatedEvent, newton: NewtonOptions, warnings: list[str]) ->
         try:
             found = _with_more(event, start, basis, newton)
         except ConvergenceError as failure:
-            warnings.append(_lost(event, start, basis, failure))
+            notes.append(_lost(event, start, basis, failure))
             break
         k = len(found.curve.names)
         moves.append(length((found.point.u[-k:] - start.point.u[-k:]) * found.point.weights[-k:]))
@@ -450,12 +449,17 @@ def _settled(event: LocatedEvent, newton: NewtonOptions, warnings: list[str]) ->
     return replace(event, off=max(moves[-2:], default=0.0))
 
 
-def _lost(event: LocatedEvent, sample: Sample, basis: HarmonicBasis, failure: ConvergenceError) -> str:
-    """A sentence on an event that other harmonics do not have."""
-    return (
-        f"{event.test.kind} near {sample.where} was located with {sample.state.basis.harmonics} harmonics; with "
-        f"{basis.harmonics} it was not found again ({failure})"
-    )
+def _lost(event: LocatedEvent, sample: Sample, basis: HarmonicBasis, failure: ConvergenceError) -> Note:
+    """A note on an event that other harmonics do not have."""
+    few, more = sample.state.basis.harmonics, basis.harmonics
+    text = f"located with few harmonics ({few}), not found again with more ({more}: {failure})"
+    return noted(event.test.kind, sample, f"{text}. Use more harmonics for the whole curve")
+
+
+def noted(kind: str, sample: Sample, text: str) -> Note:
+    """A note on an event at a motion of a tracked curve."""
+    value = sample.point.parameter
+    return Note(text, sample.curve.name, value, value, kind, sample.where)
 
 
 def _with_more(event: LocatedEvent, sample: Sample, basis: HarmonicBasis, newton: NewtonOptions) -> Sample:

@@ -10,6 +10,7 @@ import numpy as np
 from suboctave.continuation import CurvePoint, March
 from suboctave.continuation.ending import Ending, EndReason
 from suboctave.continuation.linear import cosine, distance, length
+from suboctave.continuation.notes import Note
 from suboctave.continuation.point import solved_again
 from suboctave.curves.corners import beyond_corner, grazes
 from suboctave.curves.driver import Driver
@@ -28,7 +29,7 @@ from suboctave.curves.tracked.ends import (
     rebased,
     vanished,
 )
-from suboctave.curves.tracked.events import LocatedEvent, as_event, events_between, refined
+from suboctave.curves.tracked.events import LocatedEvent, as_event, events_between, noted, refined
 from suboctave.curves.tracked.start import Ranges
 from suboctave.curves.tracked.tests import Extremum, stands, tests_of
 from suboctave.curves.tracked.watch import StepWatch
@@ -101,11 +102,9 @@ class _Tracker(Driver):
             self.march = self._marching(beyond)
         trace.closed = self.march.closed
         if self.doubtful:
-            trace.warnings.append(
-                f"at {len(self.doubtful)} of {self.compared} points whose multipliers were computed the critical one "
-                f"is missed by more than {_DOUBTFUL:g}, first at {self.doubtful[0]}: more harmonics are needed there, "
-                "or the motion is so unstable that its multipliers cannot be told"
-            )
+            share = f"{len(self.doubtful)} of {self.compared} points, the first at {self.doubtful[0]}"
+            text = f"the critical multiplier is off by more than {_DOUBTFUL:g}. Use more harmonics or a shorter range"
+            trace.notes.append(Note(text, where=share))
 
     def _finish(self) -> None:
         self.trace.bifurcations.sort(key=lambda event: event.arclength)
@@ -122,8 +121,7 @@ class _Tracker(Driver):
         if corner is None:
             return None
         point, note = corner
-        if note not in self.trace.warnings:
-            self.trace.warnings.append(note)
+        self.trace.notes.append(note)
         if point is None or not all(bounds.low <= bounds.value(point) <= bounds.high for bounds in self.others):
             return None
         self._turn_at_corner(last, point)
@@ -192,8 +190,8 @@ class _Tracker(Driver):
                 largest = np.abs(self.previous.evaluation.floquet.multipliers).max()
                 where = self.previous.where
                 detail = (
-                    f"multipliers of up to {largest:.0e} at {where} leave the critical one untold: the motions are so "
-                    "unstable there that their bifurcations have no meaning"
+                    f"the critical multiplier is lost at {where}, among others of up to {largest:.0e}: the motions are "
+                    "too unstable. Use a shorter range"
                 )
                 return Ending(EndReason.NO_MEANING, where, detail)
         if self.previous is None or point is self.march.start:
@@ -210,7 +208,7 @@ class _Tracker(Driver):
             self._take_end(a, end)
             return Ending(EndReason.MOTIONS_END, detail=end.reason)
         new = self._smooth(a, new)
-        self._take(self.watch.passed(a, new, self.trace.warnings))
+        self._take(self.watch.passed(a, new, self.trace.notes))
         if self.watch.over_corner(a, new):
             self._turn_at_corner(a, new.point)
         self._add(new)
@@ -242,15 +240,12 @@ class _Tracker(Driver):
         return bool(np.all(np.abs(point.weights * point.tangent)[bounded] < _HARDLY))
 
     def _take(self, events: list[LocatedEvent]) -> None:
-        settings, warnings = self.settings, self.trace.warnings
+        settings, notes = self.settings, self.trace.notes
         for item in events:
-            better = refined(item, settings.newton, warnings)
+            better = refined(item, settings.newton, notes)
             if not better.test.confirmed(better.sample):
-                where = better.sample.where
-                warnings.append(
-                    f"{better.test.kind} at {where} is left out: with the harmonics kept a pair of multipliers lies on "
-                    "the unit circle there, by the monodromy matrix none does"
-                )
+                text = "left out: its pair of multipliers is not confirmed by the monodromy matrix. Use more harmonics"
+                notes.append(noted(better.test.kind, better.sample, text))
                 continue
             self.trace.bifurcations.append(as_event(better, settings.stability, settings.observe))
 
@@ -276,7 +271,7 @@ class _Tracker(Driver):
     def _take_end(self, a: Sample, end: End) -> None:
         settings = self.settings
         for b in points_before(end, a, settings.newton):
-            self._take(events_between([a, b], self.tests, settings.newton, self.trace.warnings))
+            self._take(events_between([a, b], self.tests, settings.newton, self.trace.notes))
             self._add(b)
             a = b
         arclength = a.point.arclength + end.way(a)
@@ -284,7 +279,7 @@ class _Tracker(Driver):
             size = end.hopf.orbit.amplitude(settings.observe)
             self.trace.bifurcations.append(replace(end.hopf, amplitude=size, arclength=arclength))
         if end.event is not None:
-            event = refined(end.event, settings.newton, self.trace.warnings)
+            event = refined(end.event, settings.newton, self.trace.notes)
             item = as_event(event, settings.stability, settings.observe)
             curve = a.curve.augmentation.name
             self.trace.bifurcations.append(replace(item, arclength=arclength, curve=curve))

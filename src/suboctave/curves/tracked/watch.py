@@ -9,11 +9,12 @@ from contextlib import suppress
 import numpy as np
 
 from suboctave.continuation.newton import NewtonOptions
+from suboctave.continuation.notes import Note
 from suboctave.continuation.point import point_between
 from suboctave.continuation.problem import Array
 from suboctave.curves.interior import Interior, Steps, unsettled
 from suboctave.curves.sample import Sample
-from suboctave.curves.trace import joined
+from suboctave.curves.trace import joined, stretches_in_doubt
 from suboctave.curves.tracked.events import LocatedEvent, events_between, located, same_discretisation
 from suboctave.curves.tracked.tests import CurvesCross, CurveTest, Cusp, Extremum, PairCrossing
 from suboctave.errors import ConvergenceError
@@ -61,15 +62,15 @@ class StepWatch(Steps):
                 step.look()
         return self._last
 
-    def passed(self, a: Sample, b: Sample, warnings: list[str]) -> list[LocatedEvent]:
+    def passed(self, a: Sample, b: Sample, notes: list[Note]) -> list[LocatedEvent]:
         """The events between two neighbours, in the order met."""
         step = self._examined(a, b)
-        warnings += [f"{stretch}: a smaller max_step may tell" for stretch in joined(step.unsettled)]
+        notes += stretches_in_doubt(joined(step.unsettled), "Use a smaller max_step")
         self.keep(step.samples)
         self._functions = {s: known for s, known in self._functions.items() if s in self._behind}
         # parameters turn in a corner, see `follow`; the function of cusps jumps there
         tests = tuple(test for test in self.tests if not (step.corner and isinstance(test, Extremum | Cusp)))
-        return events_between(step.inside, tests, self.newton, warnings, self._found(a, b))
+        return events_between(step.inside, tests, self.newton, notes, self._found(a, b))
 
     def over_corner(self, a: Sample, b: Sample) -> bool:
         """Whether limit points turn back abruptly in a step."""
