@@ -154,3 +154,61 @@ def test_quantities_about_the_mean():
     assert_allclose(table["peak_to_peak"], 2.0 * curve.amplitude)
     with pytest.raises(so.InputError, match="must give a real number"):
         curve.to_dataframe(readings=[lambda orbit: orbit.harmonic(1)])
+
+
+def test_functions_of_motions_are_drawn(folded):
+    def power(orbit):
+        return 0.5 * orbit.velocity_amplitude(0) ** 2
+
+    (axes,) = folded.plot(quantity=power).axes
+    assert axes.get_ylabel() == "power"
+    drawn = max(line.get_ydata().max() for line in axes.lines if len(line.get_ydata()) > 2)
+    assert_allclose(drawn, max(0.5 * np.max(folded.velocity()) ** 2, 0.0), rtol=1e-3)
+    with pytest.raises(so.InputError, match="not one of a degree of freedom"):
+        folded.plot(quantity=power, dof=0)
+
+
+def test_the_linear_response_under_a_curve(duffing, folded):
+    line = folded.linear()
+    exact = F / np.abs(1.0 - line.omega**2 + 2j * ZETA * line.omega)
+    assert_allclose(line.amplitude, exact, rtol=1e-9)
+    assert_allclose(line.omega[[0, -1]], [1.0, 3.0])
+    (axes,) = folded.plot(linear=True).axes
+    texts = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert {"response", "linear response"} <= set(texts)
+    force = so.continue_branch(folded[3], "a", (0.3, 0.4))
+    with pytest.raises(so.InputError, match="nothing depends on a"):
+        force.linear()
+
+
+def test_tables_and_names_with_units(tmp_path):
+    """Hz are cycles per second; the printed table of bifurcations has as many rows as it is long."""
+    system = so.System.from_equations(
+        "y'' + 0.04*y' + y + 0.3*y**3 = f*cos(omega*t)", parameters={"f": 0.3}, units="mm, N, s"
+    )
+    curve = so.frequency_response(system, (1.0, 2.5), harmonics=5)
+    head = str(curve).splitlines()[0]
+    assert f"omega from 1 to 2.5 rad/s ({0.5 / np.pi:.6g} to {1.25 / np.pi:.6g} Hz)" in head
+    rows = str(curve.bifurcations).splitlines()
+    assert rows[0].split()[:5] == ["kind", "omega", "(rad/s)", "Hz", "amplitude"]
+    assert len(rows) - 1 == len(curve.bifurcations) == 2
+    assert_allclose(float(rows[1].split()[2]), curve.bifurcations[0].omega / (2.0 * np.pi), rtol=1e-8)
+    heads = curve.to_csv(tmp_path / "curve.csv").read_text().splitlines()[0].split(",")
+    assert heads[:3] == ["omega (rad/s)", "frequency (Hz)", "amplitude (mm)"]
+    (axes,) = curve.plot().axes
+    assert axes.get_ylabel() == r"amplitude $\max\,|y|$ (mm)"
+    assert "omega (rad/s)" not in curve.to_dataframe()
+
+
+def test_grazing_contacts_are_printed_apart():
+    system = so.System(
+        1.0, 0.1, 1.0, [so.ElasticStop(0, stiffness=1.0, gap=0.5)], [so.HarmonicLoad(0, 0.08)], dof_names=["q1"]
+    )
+    curve = so.frequency_response(system, (0.7, 1.0), harmonics=9)
+    assert len(curve.grazings) == 1
+    rows = str(curve.bifurcations).splitlines()
+    at = next(i for i, row in enumerate(rows) if row.startswith("1 grazing contact, which is no bifurcation"))
+    assert len(rows) == at + 2
+    assert len(curve.bifurcations) == (at - 1 if rows[0] != "no bifurcations" else 0)
+    (axes,) = curve.plot(quantity="velocity").axes
+    assert axes.get_ylabel() == r"velocity $\max\,|\dot{q}_{1}|$"

@@ -239,7 +239,7 @@ def test_a_degree_of_freedom_is_given_by_its_name(named, name, tmp_path):
     assert orbit.harmonic(1, name) == orbit.harmonic(1, 1)
     for draw in (lambda: so.plot(named, dof=name), lambda: so.plot_history(orbit, dof=name)):
         (axes,) = draw().axes
-        assert "x_{1}" in axes.get_ylabel()
+        assert "z_{31}" in axes.get_ylabel()
     so.integrate(named.system, omega=0.5, periods=1).plot(tmp_path / "a.png", dof=name)
 
 
@@ -260,5 +260,7 @@ def test_a_name_that_no_degree_of_freedom_has_is_refused(named, linear):
             read()
     with pytest.raises(InputError, match="they have no names"):
         linear.rms("31 z")
-    with pytest.raises(InputError, match="give its number"):
+    with pytest.raises(InputError, match="lay it out with"):
         so.plot(named.to_xarray(), dof="31 z")
+    (axes,) = so.plot(named.to_xarray(readings=["amplitude_dof31 z"]), dof="31 z").axes
+    assert "z_{31}" in axes.get_ylabel()

@@ -31,7 +31,7 @@ def branch(stable, bifurcations, events=()):
     parameters = {"p": np.linspace(0.0, 1.0, count), "k": np.full(count, 3.0)}
     orbit = SimpleNamespace(residual=1e-11, basis=SimpleNamespace(nu=2))
     return SimpleNamespace(
-        system=SimpleNamespace(n=2, name="a system", parameters={"p": 0.0, "k": 3.0}, units=None),
+        system=SimpleNamespace(n=2, name="a system", parameters={"p": 0.0, "k": 3.0}, units=None, dof_names=()),
         name="p",
         shows="response",
         orbits=[orbit] * count,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import cmath
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, overload
 
@@ -270,7 +270,7 @@ class BifurcationList:
     """Located bifurcations in the order met; `["PD"]` gives those of a kind, `[0]` one by position.
 
     Grazing contacts are no bifurcations: iteration, positions and the length leave them out, `["grazing"]` gives them,
-    and the table shows them where they lie on the curve. `met` is everything in the order met.
+    and the printed table has them below. `met` is everything in the order met.
     """
 
     def __init__(self, items: list[Bifurcation], names: tuple[str, ...] = ()) -> None:
@@ -297,29 +297,46 @@ class BifurcationList:
         return self._items[key]
 
     def __repr__(self) -> str:
-        if not self.met:
-            return "no bifurcations"
-        free = [name for name in dict.fromkeys(n for b in self.met for n in b.free_names) if name != "omega"]
-        width = max(6, 1 + max(len(b.kind) for b in self.met))
-        head = (
-            f"{'kind':<{width}} {'omega':>12}"
+        """A table of the bifurcations, as many as it is long, and below it the grazing contacts."""
+        contacts = [item for item in self.met if item.kind in CONTACT_KINDS]
+        lines = self._rows(self.met) if self.met else []
+        by_item = dict(zip(self.met, lines[1:], strict=True))
+        own = [lines[0], *(by_item[item] for item in self._items)] if self._items else ["no bifurcations"]
+        if not contacts:
+            return "\n".join(own)
+        several = f"{len(contacts)} grazing contacts, which are" if len(contacts) > 1 else "1 grazing contact, which is"
+        title = f'{several} no bifurcation{"s" * (len(contacts) > 1)} (bifurcations["grazing"]):'
+        return "\n".join([*own, title, *(by_item[item] for item in contacts)])
+
+    def _rows(self, items: Sequence[Bifurcation]) -> list[str]:
+        """The head of the table and a row for each."""
+        free = [name for name in dict.fromkeys(n for b in items for n in b.free_names) if name != "omega"]
+        units = items[0].orbit.balance.system.units
+        width = max(6, 1 + max(len(b.kind) for b in items))
+        omega, size = ("omega", "amplitude") if units is None else (
+            f"omega ({units.frequency})", f"amplitude ({units.length})"
+        )  # fmt: skip
+        wide, room = max(12, len(omega)), max(13, len(size) + 1)
+        turns = "" if units is None else f" {units.cycles:>12}"
+        rows = [
+            f"{'kind':<{width}} {omega:>{wide}}{turns}"
             + "".join(f" {name:>13}" for name in free)
-            + f" {'amplitude':>13}{'multiplier':>24}{'criticality':>15}{'residual':>11}"
-        )
-        rows = [head]
-        for b in self.met:
+            + f" {size:>{room}}{'multiplier':>24}{'criticality':>15}{'residual':>11}"
+        ]
+        for b in items:
             mu = b.critical_multiplier()
             text = f"{mu.real:.6f}" + (f"{mu.imag:+.6f}i" if abs(mu.imag) > 1e-7 else "")
             # of an equilibrium they are those of a frequency that is a matter of the method
             text = "" if b.kind == "Hopf" else text
+            turning = "" if units is None else f" {b.omega / (2.0 * np.pi):>12.9g}"
             extra = "".join(f" {b.parameter(name):>13.8g}" for name in free)
             remark = b.remark()
             label = b.criticality or ("" if b.normal_form is None else b.normal_form.shape)
             rows.append(
-                f"{b.kind:<{width}} {b.omega:>12.9g}{extra} {b.amplitude:>13.7g}{text:>24}{label:>15}"
+                f"{b.kind:<{width}} {b.omega:>{wide}.9g}{turning}{extra} {b.amplitude:>{room}.7g}{text:>24}{label:>15}"
                 f"{b.residual:>11.1e}" + (f"  {remark}" if remark else "")
             )
-        return "\n".join(rows)
+        return rows
 
 
 #: kinds of the curves that pass through points of codimension two, or begin there

@@ -479,7 +479,8 @@ class TimeResult(Stored, Pictured):
         arrays["parameters"] = ("parameter",), np.array(list(values.values()), dtype=float)
         for name, value in self._derived().items():
             (arrays if isinstance(value, tuple) else own)[name] = value
-        produced = {"dofs": n, "system": self.system.name, "suboctave": __version__}
+        produced = {"dofs": n, "dof_names": "\n".join(self.system.dof_names)}
+        produced |= {"system": self.system.name, "suboctave": __version__}
         if self.system.units:
             produced["units"] = str(self.system.units)
         if self.projection is not None:

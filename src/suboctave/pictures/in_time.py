@@ -17,7 +17,15 @@ from suboctave.errors import GivenDof, InputError, chosen_dof, suggest
 from suboctave.pictures import style
 from suboctave.pictures.boundary import boundary_drawing, datasets_of, is_boundary
 from suboctave.pictures.drawing import STROKES, Axis, Band, Entry, Frame, Guide, Markers, Polyline, Raster, dot, plain
-from suboctave.pictures.options import Coordinates, View, as_multiple, check_quantity, declared_units, shown_multiple
+from suboctave.pictures.options import (
+    Coordinates,
+    View,
+    as_multiple,
+    check_quantity,
+    declared_units,
+    parts_of_dof,
+    shown_multiple,
+)
 from suboctave.pictures.paper import Layout, picture
 from suboctave.pictures.response import response_frame
 from suboctave.pictures.strokes import check_count
@@ -234,8 +242,8 @@ def symbol_of(dataset: xarray.Dataset, dof: int, order: int) -> str:
 
 
 def _symbol_of(dataset: xarray.Dataset, dof: int, order: int) -> str:
-    symbol = f"x_{{{dof}}}" if dataset.attrs["dofs"] > 1 else "x"
-    return rf"$\dot {symbol}$" if order else f"${symbol}$"
+    letter, index = parts_of_dof(dataset, dof)
+    return rf"$\dot {letter}{index}$" if order else f"${letter}{index}$"
 
 
 def _with_unit(text: str, dataset: xarray.Dataset, order: int) -> str:

@@ -6,7 +6,8 @@ The public verbs take these as keywords; `View` and `MotionView` hold them once 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Sequence
+import re
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, Annotated, Any, TypedDict
@@ -14,8 +15,17 @@ from typing import TYPE_CHECKING, Annotated, Any, TypedDict
 import numpy as np
 
 from suboctave.errors import GivenDof, InputError, chosen_dof, suggest
+from suboctave.pictures.drawing import plain
 from suboctave.pictures.style import period_of
-from suboctave.store.layout import QUANTITIES, check_component, coordinate, has_component, reading_name
+from suboctave.store.layout import (
+    QUANTITIES,
+    Quantity,
+    check_component,
+    coordinate,
+    function_name,
+    has_component,
+    reading_name,
+)
 from suboctave.units import UnitSystem
 
 if TYPE_CHECKING:
@@ -26,7 +36,13 @@ _MEAN = r"mean of ${x}$, in modulus"  # which harmonic 0 is
 _FREQUENCIES = ("rad/s", "Hz")
 #: what of a displacement may be shown: the order of its derivative by time
 DERIVATIVES = {"displacement": 0, "velocity": 1, "acceleration": 2}
-_DOTS = ("x", r"\dot{x}", r"\ddot{x}")
+_ACCENTS = ("{0}", r"\dot{{{0}}}", r"\ddot{{{0}}}")
+#: letters that stand for themselves where a degree of freedom is called so
+_GREEK = {
+    "alpha": "α", "beta": "β", "gamma": "γ", "delta": "δ", "epsilon": "ε", "zeta": "ζ", "eta": "η", "theta": "θ",
+    "kappa": "κ", "lambda": "λ", "mu": "μ", "nu": "ν", "xi": "ξ", "rho": "ρ", "sigma": "σ", "tau": "τ", "phi": "φ",
+    "chi": "χ", "psi": "ψ", "omega": "ω",
+}  # fmt: skip
 
 
 class PageOptions(TypedDict, total=False):
@@ -63,10 +79,11 @@ class SpaceOptions(UnitOptions, total=False):
     """Keywords of `plot_space`: the quantity of curves, see `View`, and its units."""
 
     quantity: Annotated[
-        str | None,
-        'What is drawn: "amplitude" (default), "rms", "velocity", "velocity_rms", "acceleration", "acceleration_rms", '
-        '"harmonic", "phase", "peak_force", "contact_share", "impacts", "transmitted_force", "transmissibility"; a '
-        "dataset must have it: `to_xarray(readings=...)`.",
+        str | Callable[[Any], float] | None,
+        'What is drawn: "amplitude" (default), "peak_to_peak", "about_mean", "rms", "velocity", "velocity_rms", '
+        '"acceleration", "acceleration_rms", "harmonic", "phase", "peak_force", "contact_share", "impacts", '
+        '"transmitted_force", "transmissibility"; or a function of a motion, `quantity=f`, that takes a '
+        "`PeriodicOrbit` and gives a number. A dataset must have it: `to_xarray(readings=...)`.",
     ]
     harmonic: Annotated[
         float | str | None,
@@ -172,7 +189,7 @@ class View(Units):
     The quantity is the amplitude by default, with `harmonic` that of this harmonic.
     """
 
-    quantity: str = ""
+    quantity: str | Callable[[Any], float] = ""
     harmonic: Any = None
     element: int | None = None
     dof: GivenDof | None = None
@@ -183,17 +200,18 @@ class View(Units):
     def __post_init__(self) -> None:
         if not self.quantity:
             object.__setattr__(self, "quantity", "amplitude" if self.harmonic is None else "harmonic")
-        check_quantity(self.quantity, QUANTITIES)
-        needs = QUANTITIES[self.quantity].numbered
+        if not callable(self.quantity):
+            check_quantity(self.quantity, QUANTITIES)
+        needs = self.kind.numbered
         for name, given in (("harmonic", self.harmonic), ("element", self.element)):
             if given is not None and needs != name:
-                raise InputError(f"{name}={given!r} says nothing about the quantity {self.quantity!r}; leave it out")
+                raise InputError(f"{name}={given!r} says nothing about the quantity {self.called!r}; leave it out")
         if self.harmonic is not None:
             object.__setattr__(self, "harmonic", as_multiple(self.harmonic))
         if needs == "element":
-            _check_element(self.quantity, self.element)
-        if self.dof is not None and not QUANTITIES[self.quantity].of_dof:
-            raise InputError(f"the quantity {self.quantity!r} is not one of a degree of freedom: leave dof= out")
+            _check_element(self.called, self.element)
+        if self.dof is not None and not self.kind.of_dof:
+            raise InputError(f"the quantity {self.called!r} is not one of a degree of freedom: leave dof= out")
         super().__post_init__()
         for name, limits in (("xlim", self.xlim), ("ylim", self.ylim)):
             if limits is not None:
@@ -202,10 +220,22 @@ class View(Units):
             raise InputError(f'marks is a list of kinds: marks=["{self.marks}"]')
 
     @property
+    def called(self) -> str:
+        """The name of the quantity, of a function its own."""
+        return function_name(self.quantity) if callable(self.quantity) else self.quantity
+
+    @property
+    def kind(self) -> Quantity:
+        """What the quantity is; of a function of a motion no more than its name is known."""
+        return Quantity(self.called, "1", plain(self.called)) if callable(self.quantity) else QUANTITIES[self.quantity]
+
+    @property
     def variable(self) -> str:
         """The variable of the dataset that is drawn: the name of a reading."""
+        if callable(self.quantity):
+            return self.called
         numbers = {"": None, "element": self.element, "harmonic": self.multiple}
-        return reading_name(self.quantity, numbers[QUANTITIES[self.quantity].numbered], self.number)
+        return reading_name(self.quantity, numbers[self.kind.numbered], self.number)
 
     @property
     def number(self) -> int | None:
@@ -220,12 +250,15 @@ class View(Units):
         """
         if not isinstance(self.dof, str | tuple):
             return self
+        curves = list(curves)
         members = (item for curve in curves for item in (curve, *getattr(curve, "branches", ())))
         systems = (getattr(item, "system", None) for item in members)  # that of a dataset is its name
         system: Any = next((one for one in systems if hasattr(one, "dof_names")), None)
-        if system is None:
-            return self
-        return replace(self, dof=chosen_dof(self.dof, 0, system.n, names=system.dof_names))
+        if system is not None:
+            return replace(self, dof=chosen_dof(self.dof, 0, system.n, names=system.dof_names))
+        laid_out = (dof_names_of(curve) for curve in curves if hasattr(curve, "attrs"))
+        names = next((names for names in laid_out if names), ())
+        return replace(self, dof=chosen_dof(self.dof, 0, len(names), names=names)) if names else self
 
     @property
     def multiple(self) -> float:
@@ -237,12 +270,14 @@ class View(Units):
         """Whether phases are drawn, in degrees."""
         return self.quantity == "phase" and self.scale is None
 
-    def readings(self, nu: int) -> list[str]:
+    def readings(self, nu: int) -> list[str | Callable[[Any], float]]:
         """The read-offs to lay out of motions of nu load periods so that they can be drawn."""
+        if callable(self.quantity):
+            return [self.quantity]
         return [] if self.variable == "amplitude" or not self._has_component(nu) else [self.variable]
 
     def _has_component(self, nu: int) -> bool:
-        return QUANTITIES[self.quantity].numbered != "harmonic" or has_component(self.multiple, nu)
+        return self.kind.numbered != "harmonic" or has_component(self.multiple, nu)
 
     def completed(self, datasets: Sequence[xarray.Dataset]) -> list[xarray.Dataset]:
         """The datasets with the component that is drawn, also where motions have none at that frequency.
@@ -250,7 +285,7 @@ class View(Units):
         It is zero there, and its phase nan. InputError where none of the motions has it.
         """
         periods = [period_of(dataset) for dataset in datasets]
-        if QUANTITIES[self.quantity].numbered == "harmonic":
+        if self.kind.numbered == "harmonic":
             check_component(self.multiple, periods)
         nothing = math.nan if self.quantity == "phase" else 0.0
         return [
@@ -269,10 +304,14 @@ class View(Units):
         """What the axis of the quantity says, without a unit; the curves may observe different DOFs."""
         dofs = list(dict.fromkeys(int(dataset.attrs.get("observed_dof", 0)) for dataset in datasets))
         dofs = dofs if self.number is None else [self.number]
-        x = "x_i" if len(dofs) > 1 else "x" if int(datasets[0].attrs.get("dofs", 1)) == 1 else f"x_{{{dofs[0]}}}"
-        says = _MEAN if self.quantity == "harmonic" and self.multiple == 0.0 else QUANTITIES[self.quantity].axis
+        x = "x_i" if len(dofs) > 1 else symbol_of_dof(datasets[0], dofs[0])
+        says = _MEAN if self.quantity == "harmonic" and self.multiple == 0.0 else self.kind.axis
         text = says.format(x=x, k=shown_multiple(self.multiple), e=self.element)
-        return text + (f", $i$ = {', '.join(map(str, dofs))}" if len(dofs) > 1 and "{x}" in says else "")
+        # the dots stand over the letter, not over its index
+        text = re.sub(r"(\\d+ot){(\w)(_{\w+})}", r"\1{\2}\3", text)
+        names = dof_names_of(datasets[0]) or [str(dof) for dof in range(max(dofs) + 1)]
+        several = len(dofs) > 1 and "{x}" in says
+        return text + (f", $i$ = {', '.join(plain(names[dof]) for dof in dofs)}" if several else "")
 
 
 @dataclass(frozen=True)
@@ -364,7 +403,7 @@ class Coordinates:
                 text = text.removeprefix("forcing ")
             unit = view.unit if index == self._scaled else None
             if name is None and unit is None:
-                unit = "°" if view.in_degrees else view.unit_of(QUANTITIES[view.quantity].unit, datasets)
+                unit = "°" if view.in_degrees else view.unit_of(view.kind.unit, datasets)
             texts.append(text + (f" ({unit})" if unit else ""))
         own = (view.xlabel, view.ylabel, None)
         return tuple(given or text for given, text in zip(own, texts, strict=False))
@@ -399,12 +438,12 @@ class MotionView(Units):
 
     def name(self, dataset: xarray.Dataset, order: int, words: bool = False) -> str:
         """A derivative of x as an axis says it: `dx/dt (mm/s)`."""
-        index = "" if int(dataset.attrs["dofs"]) == 1 else f"_{{{int(dataset.attrs['dof'])}}}"
+        letter, index = parts_of_dof(dataset, int(dataset.attrs["dof"]))
         if self.omega_reference is not None and order:
             power = "" if order == 1 else f"^{order}"
-            text = rf"$d{power}x{index}/d(\omega_0 t){power}$"
+            text = rf"$d{power}{letter}{index}/d(\omega_0 t){power}$"
         else:
-            text = f"${_DOTS[order]}{index}$"
+            text = f"${_ACCENTS[order].format(letter)}{index}$"
         if words:
             text = f"{list(DERIVATIVES)[order]} {text}"
         declared = declared_units([dataset])
@@ -427,6 +466,33 @@ def declared_units(datasets: Sequence[xarray.Dataset]) -> UnitSystem | None:
     """The units that the systems of all datasets declare; None where they differ."""
     texts = {str(dataset.attrs.get("units", "")) for dataset in datasets}
     return UnitSystem.of(texts.pop()) if len(texts) == 1 else None
+
+
+def dof_names_of(dataset: xarray.Dataset) -> list[str]:
+    """What the degrees of freedom of a dataset are called, empty where they have no names."""
+    return [name for name in str(dataset.attrs.get("dof_names", "")).split("\n") if name]
+
+
+def parts_of_dof(dataset: xarray.Dataset, dof: int) -> tuple[str, str]:
+    """The letter of a degree of freedom and its index, `_{1}`, perhaps empty, as a formula has them: x, x_1, or the
+    name that it has, q_1 of "q1", z_31 of "31 z", x_{left} of "left".
+    """
+    names = dof_names_of(dataset)
+    if dof >= len(names):
+        return "x", "" if int(dataset.attrs.get("dofs", 1)) == 1 else f"_{{{dof}}}"
+    if of_node := re.fullmatch(r"(\w+) ([xyz])", names[dof]):
+        return of_node[2], f"_{{{of_node[1]}}}"
+    name = re.sub(r"[\W_]+", "", names[dof])
+    word, digits = re.fullmatch(r"(.*?)(\d*)", name).groups()  # type: ignore[union-attr]
+    word = _GREEK.get(word, word)
+    if len(word) != 1:
+        return "x", f"_{{{name}}}"
+    return word, f"_{{{digits}}}" if digits else ""
+
+
+def symbol_of_dof(dataset: xarray.Dataset, dof: int) -> str:
+    """A degree of freedom as a formula has it."""
+    return "".join(parts_of_dof(dataset, dof))
 
 
 def check_quantity(quantity: str, known: Collection[str]) -> None:

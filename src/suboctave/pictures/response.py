@@ -25,7 +25,7 @@ from suboctave.pictures.boundary import (
     several_of,
 )
 from suboctave.pictures.drawing import Axis, Drawing, Entry, Frame, Markers, Ticks, plain, spread
-from suboctave.pictures.options import Coordinates, CurveOptions, View
+from suboctave.pictures.options import Coordinates, CurveOptions, View, symbol_of_dof
 from suboctave.pictures.paper import draw, dress, handles, save_or_show
 from suboctave.pictures.strokes import (
     OPEN,
@@ -246,7 +246,7 @@ def _tell_apart(datasets: Sequence[xarray.Dataset], by_period: bool = False) -> 
     if not any(words) and not by_period and len(set(dofs)) < 2:
         return [f"curve {index + 1}" for index in range(len(datasets))]
     if len(set(dofs)) > 1:
-        words = [[f"$x_{{{dof}}}$", *own] for dof, own in zip(dofs, words, strict=True)]
+        words = [[f"${symbol_of_dof(data, dof)}$", *own] for data, dof, own in zip(datasets, dofs, words, strict=True)]
     if by_period:
         words = [[period_name(period_of(data)), *own] for data, own in zip(datasets, words, strict=True)]
     return [", ".join(own) for own in words]

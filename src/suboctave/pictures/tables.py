@@ -11,6 +11,7 @@ import numpy as np
 
 from suboctave.pictures import style
 from suboctave.pictures.boundary import is_boundary, kind_of, parameter_of, plane_of
+from suboctave.pictures.options import dof_names_of
 from suboctave.pictures.strokes import fixed_parameters, number_of, spelt
 from suboctave.pictures.style import period_name, period_of
 from suboctave.store.layout import coordinate, parameter_column
@@ -21,7 +22,19 @@ if TYPE_CHECKING:
 
 _TEXT = "text"
 #: attributes of a dataset that have a place of their own on the page, or none
-_PLACED = {"layout", "suboctave", "system", "free", "ended", "closed", "period", "observed_dof", "dofs", "warnings"}
+_PLACED = {
+    "layout",
+    "suboctave",
+    "system",
+    "free",
+    "ended",
+    "closed",
+    "period",
+    "observed_dof",
+    "dofs",
+    "dof_names",
+    "warnings",
+}
 _PLACED |= {"record", "digest", "contents", "tracked", "plane", "isola", "at", "seconds", "number", "early"}
 #: characters of an attribute from which it is folded away, and of a row of a table that stands beside its figure
 _LONG, _BESIDE = 400, 56
@@ -118,13 +131,15 @@ def notes_on(dataset: xarray.Dataset) -> list[str]:
 def origin_of(dataset: xarray.Dataset) -> list[tuple[str, str]]:
     """Where the numbers of a curve come from, by name."""
     attrs = dataset.attrs
+    place = int(attrs.get("observed_dof", 0))
+    observed = dict(enumerate(dof_names_of(dataset))).get(place, f"{place}")
     free = plane_of(dataset) if is_boundary(dataset) else (str(attrs["free"]),)
     # omega that does not change although it is free stands at its points
     fixed = [f"{n} = {v:.9g}" for n, v in fixed_parameters(dataset).items() if n not in map(spelt, free)]
     pairs = [
         ("computed by", f"suboctave {attrs.get('suboctave', '(unknown version)')}"),
         ("system", str(attrs.get("system") or "(no name)")),
-        ("degrees of freedom", f"{attrs.get('dofs', 1)}, observed: {attrs.get('observed_dof', 0)}"),
+        ("degrees of freedom", f"{attrs.get('dofs', 1)}, observed: {observed}"),
         ("free parameter", " and ".join(map(spelt, free))),
         ("fixed parameters", ", ".join(fixed) or "none"),
     ]

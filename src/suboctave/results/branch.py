@@ -24,12 +24,14 @@ from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.kinds import KINDS
 from suboctave.model.system import System
 from suboctave.pictures.cells import Pictured
+from suboctave.results.linear import linear_trace
 from suboctave.results.points import Peaks, Points, peaks_of, points_at
 from suboctave.results.readings import BranchReadings, Readings, columns, measure_of, with_readings
-from suboctave.store.layout import parameter_column
+from suboctave.store.layout import parameter_column, with_units
 from suboctave.store.plain import padded
 from suboctave.store.registry import Stored
 from suboctave.store.table import write_csv
+from suboctave.units import UnitSystem
 
 if TYPE_CHECKING:
     import pandas
@@ -51,11 +53,18 @@ class CurveTables(Stored, Pictured):
         """One row per bifurcation."""
 
     def to_csv(self, path: str | Path, what: str = "points", overwrite: bool = False) -> Path:
-        """The points, or the "bifurcations", as comma-separated text (.csv)."""
+        """The points, or the "bifurcations", as comma-separated text (.csv), with the units that the system declares in
+        the heads.
+        """
         frames = {"points": self.to_dataframe, "bifurcations": self.bifurcations_frame}
         if what not in frames:
             raise InputError(f"to_csv writes points or bifurcations, not {what!r}{suggest(str(what), frames)}")
-        return write_csv(frames[what](), path, overwrite)
+        return write_csv(with_units(frames[what](), self._units), path, overwrite)
+
+    @property
+    @abstractmethod
+    def _units(self) -> UnitSystem | None:
+        """Units that the system declares."""
 
     def plot(self, path: Any = None, **options: Any) -> Any:
         """Draw it: stable parts solid, unstable dashed, bifurcations marked, periods of a diagram in their own colours.
@@ -65,6 +74,15 @@ class CurveTables(Stored, Pictured):
         from suboctave.pictures import plot
 
         return plot(self, path, **options)
+
+
+def _span(name: str, first: float, last: float, units: UnitSystem | None) -> str:
+    """The range of a parameter in words, frequencies with their units."""
+    text = f"{name} from {first:.6g} to {last:.6g}"
+    if name != "omega" or units is None:
+        return text
+    turn = 2.0 * np.pi
+    return f"{text} {units.frequency} ({first / turn:.6g} to {last / turn:.6g} {units.cycles})"
 
 
 def _table(rows: list[Any]) -> Array:
@@ -160,6 +178,23 @@ class Branch(CurveTables, BranchReadings):
         """A point by its place, `curve[-1]` the last one, or some of them, `curve[10:20]`."""
         return Points(self, self.points[key]) if isinstance(key, slice) else self.points[key]
 
+    def linear(self) -> Branch:
+        """The response of the same system without its elements over the same range, `system.linear()`."""
+        system, trace = linear_trace(self)
+        response = Branch(system, self.name, trace.points, [], [], trace.closed, trace.endings, self.observe, {})
+        response.shows = "linear response"
+        return response
+
+    def plot(self, path: Any = None, *, linear: bool = False, **options: Any) -> Any:
+        """Draw it: stable parts solid, unstable dashed, bifurcations marked.
+
+        Saved if a path is given; options are those of `suboctave.plot`. `linear`: with the response of the system
+        without its elements.
+        """
+        from suboctave.pictures import plot
+
+        return plot([self, self.linear()] if linear else self, path, **options)
+
     def bound(self, point: BranchPoint) -> BranchPoint:
         """A motion on the curve as one of its points."""
         return point.on(self)
@@ -199,6 +234,10 @@ class Branch(CurveTables, BranchReadings):
         """
         what, measure = measure_of(self, quantity, dof, harmonic)
         return peaks_of(self, what, measure, self._dof(dof), harmonic)
+
+    @property
+    def _units(self) -> UnitSystem | None:
+        return self.system.units
 
     @property
     def ended(self) -> str:
@@ -407,7 +446,7 @@ class Branch(CurveTables, BranchReadings):
     def _head(self) -> str:
         """What it is, in a line."""
         values = self.parameter(self.name)
-        span = f"{self.name} from {values[0]:.6g} to {values[-1]:.6g}" if len(self) else "empty"
+        span = _span(self.name, values[0], values[-1], self._units) if len(self) else "empty"
         kind = "Branch" if self.nu == 1 else f"Branch of {period_name(self.nu)} motions"
         leaves = "" if self.departs is None else f"leaves {self.departs}; "
         return f"{kind}: {len(self)} points ({self.verdicts}), {span}; {leaves}{self.ended}."

@@ -18,6 +18,7 @@ from suboctave.interruption import Interruption
 from suboctave.results.branch import Branch, CurveTables
 from suboctave.results.readings import Readings, shared
 from suboctave.store.layout import led_by
+from suboctave.units import UnitSystem
 
 if TYPE_CHECKING:
     import pandas
@@ -188,6 +189,10 @@ class BifurcationDiagram(CurveTables):
         """What a figure marks: everything that its branches meet but contacts, which would hide the rest."""
         met = (item for branch in self.branches for item in (*branch.bifurcations, *branch.events))
         return list(dict.fromkeys(item.kind for item in met))
+
+    @property
+    def _units(self) -> UnitSystem | None:
+        return self.root.branch.system.units
 
     def to_dataframe(self, readings: Readings = False) -> pandas.DataFrame:
         """One row per point: the number, period and depth of its branch, then what `Branch.to_dataframe` has.

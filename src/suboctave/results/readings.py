@@ -41,7 +41,14 @@ from suboctave.harmonic.trigonometric import crossings, extrema
 from suboctave.model.elements.smoothness import levels as levels_of
 from suboctave.model.inputs import check_element
 from suboctave.model.system import System
-from suboctave.store.layout import QUANTITIES, RESERVED, check_component, has_component, parameter_column, reading_name
+from suboctave.store.layout import (
+    QUANTITIES,
+    check_component,
+    function_name,
+    has_component,
+    parameter_column,
+    reading_name,
+)
 
 if TYPE_CHECKING:
     import xarray
@@ -260,8 +267,6 @@ _READ: Mapping[str, Callable[[PeriodicOrbit, int, float], Any]] = {
 }
 _OF_A_DOF = ("rms", "peak_to_peak", "about_mean", "velocity", "velocity_rms", "acceleration", "acceleration_rms")
 _OF_A_GAP = ("contact_share", "impacts")
-#: columns that have a meaning already
-_TAKEN = {*QUANTITIES, *RESERVED, "multiplier_real", "multiplier_imag", "truncation"}
 _NAME = re.compile(r"(?P<what>[a-z]+(?:_[a-z]+)*?)(?:_(?P<number>\d+(?:\.\d+|/0*[1-9]\d*)?))?(?:_dof(?P<dof>.+))?")
 
 
@@ -318,9 +323,8 @@ class FunctionReading:
 
     @property
     def what(self) -> str:
-        """The name of the function; a column that has a name already keeps it."""
-        name = getattr(self.function, "__name__", type(self.function).__name__)
-        return name if name.isidentifier() and name not in _TAKEN else f"function.{name.strip('<>')}"
+        """What it is called."""
+        return function_name(self.function)
 
     @property
     def name(self) -> str:
@@ -381,8 +385,12 @@ def with_readings(dataset: xarray.Dataset, branch: Any, events: Sequence[Any], n
 
 
 def columns(branch: Any, names: Readings) -> dict[str, Array]:
-    """Read-offs as the columns of a table."""
-    return {reading.name: _on_points(branch, reading) for reading in _listed(branch, names)}
+    """Read-offs as the columns of a table, called as they were asked for."""
+    asked = names if not isinstance(names, bool | str) and isinstance(names, Iterable) else [names]
+    called = [name if isinstance(name, str) else None for name in dict.fromkeys(asked)]
+    listed = _listed(branch, names)
+    titles = called if len(called) == len(listed) else [None] * len(listed)
+    return {title or reading.name: _on_points(branch, reading) for title, reading in zip(titles, listed, strict=True)}
 
 
 def _on_points(branch: Any, reading: Reading | FunctionReading) -> Array:

@@ -23,6 +23,7 @@ import numpy as np
 
 from suboctave.errors import InputError, suggest
 from suboctave.floquet.result import no_verdict
+from suboctave.units import UnitSystem
 from suboctave.version import __version__
 
 if TYPE_CHECKING:
@@ -34,6 +35,24 @@ if TYPE_CHECKING:
 def parameter_column(name: str, taken: Collection[str]) -> str:
     """The column of a parameter in a table whose other columns have the names `taken`."""
     return f"parameter.{name}" if name in taken else name
+
+
+def with_units(frame: pandas.DataFrame, units: UnitSystem | None) -> pandas.DataFrame:
+    """A table of curves with units in its heads, "omega (rad/s)", and a column of frequencies behind that of omega; as
+    it is where the system declares none.
+    """
+    if units is None:
+        return frame
+    if "omega" in frame:
+        turns = frame["omega"] / (2.0 * np.pi)
+        frame = frame.copy()
+        frame.insert(list(frame.columns).index("omega") + 1, f"frequency ({units.cycles})", turns)
+    known = {"omega": units.frequency}
+    for column in map(str, frame.columns):
+        what = max((q for q in QUANTITIES if column == q or column.startswith(f"{q}_")), key=len, default="")
+        if what and (unit := units.name(QUANTITIES[what].unit)):
+            known[column] = unit
+    return frame.rename(columns={name: f"{name} ({unit})" for name, unit in known.items() if name in frame.columns})
 
 
 def led_by(frame: pandas.DataFrame, leading: Mapping[str, Any]) -> pandas.DataFrame:
@@ -66,7 +85,9 @@ RESERVED = frozenset(
 )
 RESERVED_PREFIXES = ("event_", "system_array_")
 #: attributes of a curve, with their defaults
-_ATTRIBUTES: dict[str, Any] = {"system": "", "ended": "", "closed": 0, "period": 1, "observed_dof": 0, "dofs": 1}
+_ATTRIBUTES: dict[str, Any] = {
+    "system": "", "ended": "", "closed": 0, "period": 1, "observed_dof": 0, "dofs": 1, "dof_names": "",
+}  # fmt: skip
 #: variables on `event`, the fields of `EventRow` that all curves have: kind, meaning
 _EVENTS: dict[str, tuple[type, str]] = {
     "kind": (object, ""),
@@ -180,6 +201,7 @@ def branch_dataset(branch: Any) -> xarray.Dataset:
         period=branch.orbits[0].basis.nu if len(branch.orbits) else 1,
         observed_dof=branch.observe,
         dofs=branch.system.n,
+        dof_names="\n".join(branch.system.dof_names),
         options={
             name: value if isinstance(value, str | int | float) else repr(value)
             for name, value in {**branch.options, "warnings": "\n".join(branch.warnings)}.items()
@@ -315,6 +337,13 @@ def reading_name(what: str, number: float | None = None, dof: int | str | None =
         short = f"{number:g}"
         what += f"_{short if float(short) == number else repr(float(number))}"
     return what if dof is None else f"{what}_dof{dof}"
+
+
+def function_name(function: Any) -> str:
+    """The name that a read-off by a function of a motion is stored under: its own, where no column has that."""
+    name = getattr(function, "__name__", type(function).__name__)
+    taken = name in QUANTITIES or name in RESERVED or name in ("multiplier_real", "multiplier_imag", "truncation")
+    return f"function.{name.strip('<>')}" if taken or not name.isidentifier() else name
 
 
 def has_component(k: float, nu: int) -> bool:

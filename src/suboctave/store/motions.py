@@ -195,6 +195,7 @@ def motion_dataset(
         "period": nu,
         "dof": chosen,
         "dofs": system.n,
+        "dof_names": "\n".join(system.dof_names),
         "amplitude": orbit.amplitude(chosen),
         "residual": float(orbit.residual),
         "error": float(orbit.truncation),
