@@ -59,7 +59,7 @@ html_theme_options = {
     "pygments_light_style": "tango",
     "pygments_dark_style": "monokai",
 }
-html_sidebars = {"index": [], "messages": []}  # no pages below them
+html_sidebars = {"index": [], "messages": [], "questions": [], "gallery": []}  # no pages below them
 
 _CODE = re.compile(r"(``.*?``|`[^`]*`)", re.S)
 

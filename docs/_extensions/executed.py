@@ -29,10 +29,12 @@ log = logging.getLogger(__name__)
 
 _INDEX = """# Examples
 
-Each script asks one question, asserts one number with its source, and draws one figure. Figures and texts below were
-made when these pages were built. The scripts are in the folder `examples` of the repository; run one with
-`python examples/ex01_rattling_oscillator.py figure.png`. The figures of a published study, which take longer, are in
-the [gallery](../gallery.md); they were computed before and are kept in the repository.
+{pictures}
+
+Each script asks one question, asserts one number with its source, and draws one figure. Figures and texts were made
+when these pages were built. The scripts are in the folder `examples` of the repository; run one with
+`python examples/ex01_rattling_oscillator.py figure.png`. The figures of a published study take longer. They are on
+[a page of their own](../published_study.md) and are kept in the repository.
 
 {rows}
 
@@ -105,12 +107,21 @@ def make_pages(app) -> None:
                     log.warning("examples/%s failed: %s", script.name, wrong)
         log.info("examples: %d scripts in %.0f s", len(scripts), time.perf_counter() - began)
     PAGES.mkdir(exist_ok=True)
-    rows = []
+    rows, cells = [], []
     for script in scripts:
         title, page = _page(script, printed[script], execute)
         _write(PAGES / f"{script.stem}.md", page)
         rows.append(f"- [{title}]({script.stem}.md)")
-    _write(PAGES / "index.md", _INDEX.format(rows="\n".join(rows), names="\n".join(script.stem for script in scripts)))
+        if execute and (KEPT / f"{script.stem}.png").exists():
+            cells.append(f"[![{title}](../_build/executed/{script.stem}.png)]({script.stem}.md) {title}")
+    names = "\n".join(script.stem for script in scripts)
+    _write(PAGES / "index.md", _INDEX.format(pictures=_in_columns(cells), rows="\n".join(rows), names=names))
+
+
+def _in_columns(cells: list[str]) -> str:
+    """Pictures three in a row."""
+    lines = [" | ".join(cells[i : i + 3] + [""] * (3 - len(cells[i : i + 3]))) for i in range(0, len(cells), 3)]
+    return "\n".join(["| | | |", "|---|---|---|", *(f"| {line} |" for line in lines)]) if cells else ""
 
 
 def _write(path: Path, text: str) -> None:

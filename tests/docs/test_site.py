@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 
@@ -22,3 +23,24 @@ def test_the_site_is_built_without_a_warning(tmp_path):
     index = (tmp_path / "html" / "index.html").read_text(encoding="utf-8")
     assert "Getting started" in index
     assert "https://cdn" not in index  # nothing is fetched when a page is read
+
+
+def test_a_search_for_what_is_asked_first_finds_it():
+    """Words in titles come first in the search of the site; each of these has one on the page of questions."""
+    titles = re.findall(r"^### (.*)", (DOCS / "questions.md").read_text(encoding="utf-8"), re.M)
+    asked = (
+        "log",
+        "axis",
+        "dB",
+        "CSV",
+        "Excel",
+        "natural frequencies",
+        "export",
+        "peak",
+        "Hz",
+        "phase",
+        "rotor",
+        "slow",
+    )
+    for word in asked:
+        assert any(re.search(rf"\b{word}", title, re.I) for title in titles), word

@@ -12,7 +12,7 @@ from event_tables import against_recorded, recording
 
 FOLDER = Path(__file__).parents[2] / "examples" / "gallery"
 SCRIPTS = sorted(FOLDER.glob("fig*.py"))
-PAGE = Path(__file__).parents[2] / "docs" / "gallery.md"
+PAGE = Path(__file__).parents[2] / "docs" / "published_study.md"
 
 
 def run(script, arguments, monkeypatch):

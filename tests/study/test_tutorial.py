@@ -7,16 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import scipy.linalg
 
 import suboctave as so
 from suboctave.study.cli import examples
 
 ROOT = Path(__file__).parents[2]
-TUTORIAL = (ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8")
-FIRST, LAST = TUTORIAL.split("## 5. ")
-LAST, BOUNDARIES = LAST.split("## 6. ")
-BOUNDARIES, LARGE = BOUNDARIES.split("## 7. ")
+TUTORIAL = (ROOT / "docs" / "tutorial" / "first_study.md").read_text(encoding="utf-8")
+FIRST, LAST = TUTORIAL.split("## Period doubling, ")
+LAST, BOUNDARIES = LAST.split("## Boundaries")
 CASCADE, SUBHARMONIC = LAST.split("### Sub-harmonics")
 
 
@@ -58,7 +56,7 @@ def test_its_study_and_its_script(suboctave, tmp_path, monkeypatch, capsys):
 
     script, again = blocks("python")
     scope = {}
-    exec(compile(script + again, "docs/tutorial.md", "exec"), scope)
+    exec(compile(script + again, "docs/tutorial/first_study.md", "exec"), scope)
     said = capsys.readouterr().out
     printed = blocks("text")[1]
     assert said.splitlines()[0] == printed.splitlines()[0]
@@ -83,9 +81,9 @@ def test_its_cascade(suboctave, tmp_path, monkeypatch, capsys):
     switched, tree = blocks("python", CASCADE)
     said, printed = blocks("text", CASCADE)
     scope = {}
-    exec(compile(made.split("curve = ")[0] + switched, "docs/tutorial.md", "exec"), scope)
+    exec(compile(made.split("curve = ")[0] + switched, "docs/tutorial/first_study.md", "exec"), scope)
     assert capsys.readouterr().out == said
-    exec(compile(tree, "docs/tutorial.md", "exec"), scope)
+    exec(compile(tree, "docs/tutorial/first_study.md", "exec"), scope)
     assert without_points(capsys.readouterr().out) == without_points(printed)
     assert Path("cascade.png").stat().st_size > 0
     diagram = so.load("cascade.nc")
@@ -111,7 +109,7 @@ def test_its_cascade(suboctave, tmp_path, monkeypatch, capsys):
 
 def test_its_isolated_subharmonic(capsys):
     (script,), (printed,) = blocks("python", SUBHARMONIC), blocks("text", SUBHARMONIC)
-    exec(compile("import suboctave as so\n" + script, "docs/tutorial.md", "exec"), {})
+    exec(compile("import suboctave as so\n" + script, "docs/tutorial/first_study.md", "exec"), {})
     assert capsys.readouterr().out == printed
 
 
@@ -130,9 +128,9 @@ def test_its_boundaries(suboctave, tmp_path, monkeypatch, capsys):
     (text,), (more,) = blocks("toml"), blocks("toml", BOUNDARIES)
     (script, _), (chapter,) = blocks("python"), blocks("python", BOUNDARIES)
     scope = {}
-    exec(compile(script, "docs/tutorial.md", "exec"), scope)
+    exec(compile(script, "docs/tutorial/first_study.md", "exec"), scope)
     capsys.readouterr()
-    exec(compile(chapter, "docs/tutorial.md", "exec"), scope)
+    exec(compile(chapter, "docs/tutorial/first_study.md", "exec"), scope)
     said = capsys.readouterr().out
     assert [said] == blocks("text", BOUNDARIES)
     assert Path("boundaries.png").stat().st_size > 0
@@ -169,18 +167,3 @@ def test_the_housing_on_a_shaker(suboctave, tmp_path):
     assert first.omega == pytest.approx(high, rel=1e-9)
     assert last.omega == pytest.approx(low, rel=1e-9)
     assert sum(line.startswith(" LP") for line in out.splitlines()) == 2
-
-
-def test_its_large_model():
-    """The reduced system keeps the lowest natural frequencies of the whole one; elements act between its DOFs."""
-    (script,) = blocks("python", LARGE)
-    n = 60
-    stiffness = 1e4 * (2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1))
-    scope = {"so": so, "scipy": scipy, "mass": np.eye(n), "damping": 1e-4 * stiffness, "stiffness": stiffness}
-    exec(compile(script, "docs/tutorial.md", "exec"), scope)
-    mass, _, held = scope["reduced"].matrices()
-    kept = 2.0e2 * np.sin(0.5 * np.pi * np.arange(1, 21) / (n + 1))
-    np.testing.assert_allclose(np.sqrt(scipy.linalg.eigh(held, mass)[0]), kept, rtol=1e-9)
-    element = scope["reduced"].elements[0]
-    shape = scope["modes"].T @ np.eye(n)[7]
-    assert element.direction(20) @ shape == pytest.approx((scope["modes"][7] - scope["modes"][4]) @ shape)
