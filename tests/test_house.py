@@ -39,8 +39,8 @@ ROOMS = [
 ]
 # Modules beside the rooms: they belong to everybody and import nothing of ours but each other.
 COMMON = {
-    "arguments", "atomic", "compiled", "errors", "interruption", "kinds", "lazy", "motion", "options", "progress",
-    "readings", "session", "units", "version", "workers",
+    "arguments", "atomic", "compiled", "errors", "frontdoor", "interruption", "kinds", "lazy", "motion", "options",
+    "progress", "readings", "session", "units", "version", "workers",
 }  # fmt: skip
 # Rooms that are kept even further apart than the order asks.
 APART = {

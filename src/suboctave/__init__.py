@@ -15,20 +15,7 @@ costs next to nothing.
 
 from __future__ import annotations
 
-import lazy_loader
-
+from suboctave.frontdoor import attached
 from suboctave.version import __version__ as __version__
 
-_public, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
-
-
-def __getattr__(name: str) -> object:
-    if name in __all__:
-        value = _public(name)
-        globals()[name] = value
-        return value
-    if name.startswith("_"):  # protocol probes of notebooks, copy, pickle: no search for a suggestion
-        raise AttributeError(f"module 'suboctave' has no attribute {name!r}")
-    from suboctave.errors import suggest
-
-    raise AttributeError(f"suboctave has no {name!r}{suggest(name, __all__)}")
+__getattr__, __dir__, __all__ = attached(__name__, __file__)

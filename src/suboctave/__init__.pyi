@@ -1,6 +1,6 @@
 """The public names and where they are defined; read by type checkers and, lazily, by `__init__.py`."""
 
-from . import structures as structures
+from . import results as results, structures as structures
 from .analysis.branches import (
     continue_branch as continue_branch,
     frequency_response as frequency_response,
@@ -105,7 +105,8 @@ from .pictures import (
     write_report as write_report,
     write_vtu as write_vtu,
 )
-from .results import BifurcationDiagram as BifurcationDiagram, Branch as Branch
+from .results.branch import Branch as Branch
+from .results.diagram import BifurcationDiagram as BifurcationDiagram
 from .structures import (
     DofMap as DofMap,
     Mesh as Mesh,

@@ -62,11 +62,11 @@ Range = tuple[float, float]
 @timed
 def nonlinear_mode(
     system: System,
+    omega: Range | None = None,
     *,
     mode: int = 1,
     amplitude: float | Range | None = None,
     energy: float | Range | None = None,
-    omega: Range | None = None,
     damped: bool | None = None,
     harmonics: Harmonics = "adaptive",
     **options: Unpack[TrackOptions],
@@ -81,9 +81,9 @@ def nonlinear_mode(
     ----------
     mode
         The linear mode that it begins with, 1 the lowest of those that oscillate about the position of rest.
-    amplitude, energy, omega
-        Where it ends: the largest |x| of the observed DOF or the mean energy, up to a value or from one to another; the
-        frequency's range, rad per unit time. By default it begins where forces are linear but
+    omega, amplitude, energy
+        Where it ends: the frequency's range, rad per unit time; the largest |x| of the observed DOF or the mean energy,
+        up to a value or from one to another. By default it begins where forces are linear but
         for 1e-4, a linear mode at a thousandth of its last amplitude.
     damped
         Whether velocity-dependent forces count; False leaves damping matrices out. Default: whether there are any.
