@@ -33,3 +33,32 @@ def test_a_move_by_more_harmonics_is_measured_in_the_curves_own_parameter(monkey
     (line,) = lines(notes)
     assert line.startswith(f"LP at F = {item.parameter('F'):.9g}: too few harmonics, it moves (")
     assert np.isfinite(item.uncertainty)
+
+
+def test_a_doubling_with_too_few_harmonics_is_solved_for_where_it_lies_with_more():
+    """A response of 5 harmonics right behind a grazing has its doubling at 0.18207, where the multiplier of the motions
+    is -1.18; by shooting it is within 1e-4 of -1 at 0.1816267.
+    """
+    system = so.System(
+        np.diag([1.72212098, 1.90133601, 1.68477436, 1.24150018]),
+        [
+            [0.1772445, -0.11149915, 0, 0],
+            [-0.11149915, 0.18243463, -0.03494239, 0],
+            [0, -0.03494239, 0.11958068, -0.05274481],
+            [0, 0, -0.05274481, 0.07624693],
+        ],
+        [
+            [2.22603621, -1.7159445, 0, 0],
+            [-1.7159445, 2.2536995, -0.5377548, 0],
+            [0, -0.5377548, 1.34948456, -0.81172976],
+            [0, 0, -0.81172976, 0.81172976],
+        ],
+        [so.ElasticStop(1, 3.92111183, -0.57777866, side="left")],
+        [so.HarmonicLoad(0, 0.13081868)],
+    )
+    branch = so.frequency_response(system, (0.16215788, 0.19))
+    first, second = branch.bifurcations["PD"]
+    assert abs(first.omega - 0.1816267) < 5e-7
+    assert np.abs(first.floquet.multipliers + 1.0).min() < 1e-3
+    assert not branch.warnings
+    assert second.omega > first.omega

@@ -13,7 +13,7 @@ from suboctave.continuation import NewtonOptions
 from suboctave.continuation.linear import distance, length
 from suboctave.continuation.notes import Note
 from suboctave.continuation.point import solved_again
-from suboctave.curves.events.beyond import lacks_harmonics, resolved, zero_beside
+from suboctave.curves.events.beyond import is_bifurcation, lacks_harmonics, resolved, zero_beside
 from suboctave.curves.events.layer import (
     behind_grazing,
     grazing_beside,
@@ -110,13 +110,15 @@ def bifurcation_at(located: Located, a: Sample, b: Sample, observe: int, notes: 
             contact=beside,
         )
     unit = curve.unit(located.sample.point.weights)
-    item = solved_bifurcation(located.kind, solution, curve, observe, notes, arclength, unit, (a, b))
+    own: list[Note] = []
+    item = solved_bifurcation(located.kind, solution, curve, observe, own, arclength, unit, (a, b))
     if located.width > item.uncertainty:
         item = replace(item, uncertainty=located.width)
-    known = with_what_harmonics_move(located, item, a, b, notes)
+    known = with_what_harmonics_move(located, item, a, b, observe, own)
     if known is None:
         return None
     item = known
+    notes += own
     if item.kind != "BP":
         return item
     share = located.fraction
@@ -158,10 +160,11 @@ def _seen_with_more(
 
 
 def with_what_harmonics_move(
-    located: Located, item: Bifurcation, a: Sample, b: Sample, notes: list[Note]
+    located: Located, item: Bifurcation, a: Sample, b: Sample, observe: int, notes: list[Note]
 ) -> Bifurcation | None:
-    """A bifurcation solved for between two samples with the uncertainty that the harmonics left out make, where they
-    are too few: the distance from where it lies with more of them. None if there is none with more.
+    """A bifurcation solved for between two samples with too few harmonics: solved for from where it lies with more, or,
+    where the curve has no more, with its distance from there as uncertainty. None if there is none with more. `notes`:
+    what was said of it with too few.
     """
     kind, curve, state = located.kind, b.curve, item.orbit.state()
     solution = Singular(state, item.null_vectors, item.kappa, item.residual, 0)
@@ -176,6 +179,11 @@ def with_what_harmonics_move(
         finer = None
     if finer is None:
         return None
+    if curve.adaptive is not None and next_harmonics(state, curve.adaptive).size > state.basis.size:
+        with suppress(ConvergenceError):
+            again = kind.solve(Guess(finer.motion.state, curve.name, curve.span, item.kappa))
+            notes.clear()
+            return solved_bifurcation(kind, again, curve, observe, notes, item.arclength)
     moved = abs(item.parameter(curve.name) - finer.motion.parameter)
     return replace(item, floquet=finer.floquet, uncertainty=max(item.uncertainty, _COVERED * moved))
 
@@ -326,10 +334,12 @@ def _refined(
                 behind = behind_grazing(kind, guess)
                 if behind is None or not _lies_between(behind, wide, *neighbours):
                     behind = _between(kind, wide, *neighbours)
-                if behind is None and not _within_reach(better, wide, *neighbours):
+                # one whose multiplier is off the circle by more than its error is none: harmonics moved it here
+                elsewhere = behind is None and not _within_reach(better, wide, *neighbours)
+                if elsewhere and is_bifurcation(kind, solution):
                     there = _guess_from(better, curve).parameter
                     raise ConvergenceError(f"it leads to another one, at {curve.name} = {there:.6g}")
-                better = behind or better
+                better, neighbours = behind or better, None if elsewhere else neighbours
         except ConvergenceError as failure:
             text = (
                 f"located with few harmonics ({state.basis.harmonics}), not found again with more ({basis.harmonics}: "

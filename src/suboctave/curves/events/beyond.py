@@ -44,16 +44,32 @@ class Resolved(NamedTuple):
     width: float
 
 
+def is_bifurcation(kind: BifurcationKind, solution: Singular) -> bool:
+    """Whether the critical multiplier of a solved bifurcation lies within its error of where it should be."""
+    critical = kind.critical(solution)
+    if critical is None:
+        return True
+    away, error = _off_circle(solution, critical)
+    return away <= max(error, CRITICAL)
+
+
 def lacks_harmonics(kind: BifurcationKind, solution: Singular, curve: MotionProblem) -> bool:
-    """Whether the harmonics of a located bifurcation, the most that its curve may have, leave it open where it lies."""
+    """Whether the harmonics of a located bifurcation leave it open where it lies: they are the most that its curve may
+    have, or more led nowhere.
+    """
     rule, critical = curve.adaptive, kind.critical(solution)
     if rule is None or critical is None or kind.name not in _SCALARS or kind.multiplicity > 1:
         return False
     if next_harmonics(solution.state, rule).size > solution.state.basis.size:
-        return False
+        return not is_bifurcation(kind, solution)
+    return not max(_off_circle(solution, critical)) <= CRITICAL
+
+
+def _off_circle(solution: Singular, critical: complex) -> tuple[float, float]:
+    """Distance of the multiplier nearest to the critical value from it, and its error."""
     away = np.abs(solution.floquet.multipliers - critical)
     nearest = int(np.argmin(away))
-    return not max(float(away[nearest]), float(solution.floquet.errors[nearest])) <= CRITICAL
+    return float(away[nearest]), float(solution.floquet.errors[nearest])
 
 
 def resolved(kind: BifurcationKind, solution: Singular, curve: MotionProblem, tangent: Array) -> Resolved | None:
