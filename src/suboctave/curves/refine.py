@@ -110,15 +110,15 @@ def bifurcation_at(located: Located, a: Sample, b: Sample, observe: int, notes: 
             contact=beside,
         )
     unit = curve.unit(located.sample.point.weights)
-    own: list[Note] = []
-    item = solved_bifurcation(located.kind, solution, curve, observe, own, arclength, unit, (a, b))
+    remarks: list[Note] = []
+    item = solved_bifurcation(located.kind, solution, curve, observe, remarks, arclength, unit, (a, b))
     if located.width > item.uncertainty:
         item = replace(item, uncertainty=located.width)
-    known = with_what_harmonics_move(located, item, a, b, observe, own)
+    known = with_what_harmonics_move(located, item, a, b, observe, remarks)
     if known is None:
         return None
     item = known
-    notes += own
+    notes += remarks
     if item.kind != "BP":
         return item
     share = located.fraction
