@@ -22,6 +22,8 @@ from suboctave.errors import InputError, is_number, shortened, suggest
 from suboctave.harmonic.basis import Array
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.results.between import Between, Measure, orbit_at, value_at
+from suboctave.store.layout import unit_of_column
+from suboctave.units import UnitSystem
 
 if TYPE_CHECKING:
     import pandas
@@ -93,12 +95,25 @@ class Points(Sequence[BranchPoint]):
     def __repr__(self) -> str:
         if not len(self):
             return self.note or "no points"
-        names = list(dict.fromkeys(["omega", *self.curve._free]))
-        rows = [f"{'':4}" + "".join(f"{name:>14}" for name in names) + f"{'amplitude':>14}  stable"]
-        for i, point in enumerate(self):
-            values = "".join(f"{point.parameter(name):>14.8g}" for name in names)
-            rows.append(f"{i:<4}{values}{point.amplitude:>14.8g}  {'yes' if point.stable else 'no'}")
+        units = self.curve.system.units
+        columns = {_titled("omega", units): self.omega}
+        if units is not None:
+            columns[units.cycles] = self.omega / (2.0 * math.pi)
+        columns |= {name: self.parameter(name) for name in self.curve._free if name != "omega"}
+        columns[_titled("amplitude", units)] = self.amplitude
+        widths = [max(14, 2 + len(title)) for title in columns]
+        head = "".join(f"{title:>{width}}" for title, width in zip(columns, widths, strict=True))
+        rows = [f"{'':3}{head}  stable"]
+        for i, (values, stable) in enumerate(zip(zip(*columns.values(), strict=True), self.stable, strict=True)):
+            cells = "".join(f"{value:>{width}.8g}" for value, width in zip(values, widths, strict=True))
+            rows.append(f"{i:<3}{cells}  {'yes' if stable else 'no'}")
         return "\n".join(rows)
+
+
+def _titled(name: str, units: UnitSystem | None) -> str:
+    """The head of a column with its unit, where the system declares units."""
+    unit = unit_of_column(name, units)
+    return f"{name} ({unit})" if unit else name
 
 
 def points_at(curve: Any, place: dict[str, Any]) -> Points:
@@ -227,14 +242,15 @@ class Peaks(Sequence[Peak]):
         if not self._peaks:
             return self.note or "no peaks"
         units = self.curve.system.units
-        wide = max(14, len(self.what) + 2)
+        first, what = _titled(self.curve.name, units), _titled(self.what, units)
+        room, wide = max(14, len(first) + 1), max(14, len(what) + 2)
         turns = f"{units.cycles if units else '1/time':>12}"
-        head = f"{self.curve.name:>14}{turns}{self.what:>{wide}}{'width':>12}{'harmonic':>10}{'phase':>9}  stable"
+        head = f"{first:>{room}}{turns}{what:>{wide}}{'width':>12}{'harmonic':>10}{'phase':>9}  stable"
         rows = [head]
         for peak in self:
             width = "-" if peak.width is None else f"{peak.width:.6g}"
             rows.append(
-                f"{peak.parameter:>14.8g}{peak.hertz:>12.6g}{peak.height:>{wide}.7g}{width:>12}{peak.harmonic:>10g}"
+                f"{peak.parameter:>{room}.8g}{peak.hertz:>12.6g}{peak.height:>{wide}.7g}{width:>12}{peak.harmonic:>10g}"
                 f"{math.degrees(peak.phase):>8.1f}°  {'yes' if peak.stable else 'no'}"
             )
         return "\n".join(rows)

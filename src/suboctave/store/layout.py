@@ -47,12 +47,18 @@ def with_units(frame: pandas.DataFrame, units: UnitSystem | None) -> pandas.Data
         turns = frame["omega"] / (2.0 * np.pi)
         frame = frame.copy()
         frame.insert(list(frame.columns).index("omega") + 1, f"frequency ({units.cycles})", turns)
-    known = {"omega": units.frequency}
-    for column in map(str, frame.columns):
-        what = max((q for q in QUANTITIES if column == q or column.startswith(f"{q}_")), key=len, default="")
-        if what and (unit := units.name(QUANTITIES[what].unit)):
-            known[column] = unit
-    return frame.rename(columns={name: f"{name} ({unit})" for name, unit in known.items() if name in frame.columns})
+    known = {str(name): unit_of_column(str(name), units) for name in frame.columns}
+    return frame.rename(columns={name: f"{name} ({unit})" for name, unit in known.items() if unit})
+
+
+def unit_of_column(name: str, units: UnitSystem | None) -> str:
+    """The unit of omega and of what is read off motions, by the name of a column; empty for others, without units."""
+    if units is None:
+        return ""
+    if name == "omega":
+        return units.frequency
+    what = max((q for q in QUANTITIES if name == q or name.startswith(f"{q}_")), key=len, default="")
+    return units.name(QUANTITIES[what].unit) if what else ""
 
 
 def led_by(frame: pandas.DataFrame, leading: Mapping[str, Any]) -> pandas.DataFrame:
