@@ -12,6 +12,7 @@ import sys
 import typing
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import suboctave as so
@@ -182,3 +183,47 @@ def test_the_front_door_of_results():
     assert set(dir(so.results)) == set(so.results.__all__)
     with pytest.raises(AttributeError, match="did you mean 'Branch'"):
         so.results.Brnch  # noqa: B018
+
+
+# ------------------------------------------------------------------------------------------------------------- details
+def test_a_range_is_asked_for_in_words():
+    system = so.library.duffing()
+    for call in (
+        lambda: so.frequency_response(system, 3.0),
+        lambda: so.equilibria(system, "F", "ab"),
+        lambda: so.find_isolas(system, (1.0, 2.0), "F", bounds=3.0),
+    ):
+        with pytest.raises(so.InputError, match=r"^(omega|bounds) must be two numbers \(from, to\), not"):
+            call()
+
+
+def test_a_matrix_without_parameters_is_an_array():
+    system = so.System(2.0, "c", 1.0, parameters={"c": 0.1})
+    np.testing.assert_array_equal(np.asarray(system.mass), [[2.0]])
+    assert np.asarray(system.mass, dtype=np.float32).dtype == np.float32
+    with pytest.raises(so.InputError, match=r"damping depends on c: system.matrices\(\) has its numbers"):
+        np.asarray(system.damping)
+    np.testing.assert_array_equal(system.matrices()[1], [[0.1]])
+
+
+def test_the_library_shows_systems_alone():
+    assert all(isinstance(getattr(so.library, name)(), so.System) for name in dir(so.library) if "physical" not in name)
+
+
+def test_results_by_name_answer_as_dictionaries():
+    response = so.frequency_response(so.library.duffing(c=0.1, F=0.3), (2.5, 0.8), harmonics=3)
+    of_fold = so.sensitivity(response.bifurcations["LP"][0])
+    for mapping in (of_fold, so.Results({"response": response})):
+        assert "zeta" not in mapping
+        assert [] not in mapping
+        assert mapping.get([], 3) == mapping.get("zeta", 3) == 3
+        with pytest.raises(so.InputError, match="'zeta'"):
+            mapping["zeta"]
+
+
+def test_an_evaluation_needs_all_parameters_and_a_number():
+    orbit = so.frequency_response(so.library.duffing(F=0.3), (0.5, 0.51), harmonics=3).orbits[0]
+    with pytest.raises(so.InputError, match="values leaves out m, c, k, alpha, F: give all parameters"):
+        orbit.balance.at(orbit.x, 1.0, values={})
+    with pytest.raises(so.InputError, match="omega must be a number"):
+        orbit.balance.at(orbit.x, omega=10**400)

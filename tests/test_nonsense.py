@@ -58,7 +58,7 @@ def laws(item: type) -> bool:
 
 
 #: annotations of what the callable reads itself: several forms, coefficients, places
-_ITSELF = ("Any", "Number", "Dof", "Swept", "ArrayLike | None")
+_ITSELF = ("Any", "Number", "Dof", "Swept", "ArrayLike | None", "GivenName", "GivenLabels", "GivenDofs")
 
 
 @pytest.mark.parametrize(("name", "call", "first"), [pytest.param(*one, id=one[0]) for one in callables()])
@@ -119,11 +119,11 @@ WRONG = {
     ),
     "a set": (
         lambda s, b: so.frequency_response(s, {0.9, 0.95}),
-        "omega must be two finite numbers, (first, second), not {0.9, 0.95}",
+        "omega must be two numbers (from, to), not {0.9, 0.95}",
     ),
     "a generator": (
         lambda s, b: so.frequency_response(s, (w for w in (0.9, 0.95))),
-        "omega must be two finite numbers, (first, second), not <generator object ...",
+        "omega must be two numbers (from, to), not <generator object ...",
     ),
     "no system": (lambda s, b: so.HarmonicBalance(2.5, None), "HarmonicBalance: system must be a System, not 2.5"),
     "samples": (

@@ -22,7 +22,7 @@ import sys
 import types
 import typing
 from collections.abc import Callable, Mapping, Sequence
-from typing import Annotated, Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, NamedTuple, TypeAlias, TypeVar, Union, get_args, get_origin
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -88,6 +88,8 @@ Matrix = Annotated[Any, Rule("a matrix of numbers", lambda value: array_like(val
 #: a text in which bytes that are no UTF-8 may be escaped, as in the names of files
 Title = Annotated[Any, Rule("a text", lambda value: isinstance(value, str))]
 Name = Annotated[str, Rule("a text that is not empty", bool)]
+#: of a frequency or a parameter
+Range: TypeAlias = Annotated[tuple[float, float], Rule("two numbers (from, to)", lambda ends: True, "pairs (from, to)")]
 Progress = Callable[[float, str], Any] | bool | None
 
 

@@ -34,7 +34,7 @@ class SuboctaveError(Exception):
     """Anything that this package refuses or cannot do."""
 
     def __str__(self) -> str:
-        return printable(super().__str__())
+        return printable(Exception.__str__(self))
 
 
 class InputError(SuboctaveError, ValueError):
@@ -55,6 +55,10 @@ class InputError(SuboctaveError, ValueError):
     def parts(self) -> tuple[InputError, ...]:
         """See the class."""
         return self._parts or (self,)
+
+
+class UnknownName(InputError, KeyError):
+    """A name that a mapping does not have; a KeyError too, so that `in` and `get` answer as those of a dictionary."""
 
 
 class Refusals:

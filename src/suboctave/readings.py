@@ -24,10 +24,11 @@ _LARGEST = 2**63 - 1
 
 
 class Rule(NamedTuple):
-    """What values of an annotated type are allowed: in words, and by a function of the value."""
+    """What values of an annotated type are allowed: in words, and by a function of the value; `several` of them."""
 
     words: str
     holds: Callable[[Any], bool]
+    several: str = ""
 
 
 class Unfit(Exception):
@@ -65,14 +66,17 @@ def _reading(words: str, fits: Callable[[Any], bool], several: str = "") -> Read
 
 
 def _is_real(value: Any) -> bool:
-    return isinstance(value, numbers.Real) and not isinstance(value, bool)
+    if isinstance(value, bool) or not isinstance(value, numbers.Real):
+        return False
+    try:
+        float(value)
+    except OverflowError:  # a whole number of hundreds of digits
+        return False
+    return True
 
 
 def _is_finite(value: Any) -> bool:
-    try:
-        return _is_real(value) and math.isfinite(value)
-    except OverflowError:  # a whole number of hundreds of digits
-        return False
+    return _is_real(value) and math.isfinite(value)
 
 
 def _is_text(value: Any) -> bool:
@@ -312,6 +316,9 @@ def union_reading(readings: Sequence[Reading]) -> Reading:
 
 def with_rules(reading: Reading, rules: Sequence[Rule]) -> Reading:
     words = next((rule.words for rule in rules if rule.words), reading.words)
+    several = next((rule.several for rule in rules if rule.several), "") or (
+        words.split(" ", 1)[-1] + "s" if words != reading.words else reading.several
+    )
 
     def read(value: Any) -> Any:
         try:
@@ -323,7 +330,7 @@ def with_rules(reading: Reading, rules: Sequence[Rule]) -> Reading:
                 raise Unfit(rule.words, value)
         return used
 
-    return Reading(words, words.split(" ", 1)[-1] + "s" if words != reading.words else reading.several, read)
+    return Reading(words, several, read)
 
 
 class Absent:

@@ -31,9 +31,9 @@ RESPONSE = {
     "no load": (lambda s, b: so.frequency_response(so.System(1.0, 0.1, 1.0), (1, 2)), "no periodic load: add loads="),
     "one frequency": (
         lambda s, b: so.frequency_response(s, 1.0),
-        r"omega must be two finite numbers, \(first, second\), not 1\.0",
+        r"omega must be two numbers \(from, to\), not 1\.0",
     ),
-    "three frequencies": (lambda s, b: so.frequency_response(s, (1, 2, 3)), "omega must be two finite numbers"),
+    "three frequencies": (lambda s, b: so.frequency_response(s, (1, 2, 3)), r"omega must be two numbers \(from, to\)"),
     "equal ends": (lambda s, b: so.frequency_response(s, (1, 1)), "two different finite ends"),
     "nan": (lambda s, b: so.frequency_response(s, (NAN, 1)), r"omega\[0\] must be a finite number, not nan"),
     "infinite": (lambda s, b: so.frequency_response(s, (1, INF)), r"omega\[1\] must be a finite number, not inf"),
@@ -113,7 +113,7 @@ ALONG = {
     "misspelt": (lambda s, b: so.continue_branch(b.orbits[0], "alhpa", (0, 2)), "did you mean 'alpha'"),
     "no name": (lambda s, b: so.continue_branch(b.orbits[0], 3, (0, 2)), "parameter must be a text, not 3"),
     "equal": (lambda s, b: so.continue_branch(b.orbits[0], "F", (0, 0)), "two different finite ends"),
-    "one number": (lambda s, b: so.continue_branch(b.orbits[0], "F", 1.0), "bounds must be two finite numbers"),
+    "one number": (lambda s, b: so.continue_branch(b.orbits[0], "F", 1.0), r"bounds must be two numbers \(from, to\)"),
     "outside": (lambda s, b: so.continue_branch(b.orbits[0], "F", (2, 3)), r"F=0\.3, outside the bounds \(2, 3\)"),
     "another omega": (lambda s, b: so.continue_branch(b.orbits[0], "F", (0, 2), omega=9.0), "differs.*leave it out"),
     "text omega": (

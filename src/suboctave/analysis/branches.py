@@ -16,6 +16,7 @@ import numpy as np
 from suboctave.analysis.options import CurveOptions, CurveRun, Inherited, check_inside, settings_of
 from suboctave.analysis.subharmonics import check_order, subharmonic_start
 from suboctave.analysis.switch_tracked import leaves_free_phase, switch_tracked
+from suboctave.arguments import Range
 from suboctave.bifurcation.bifurcation import Bifurcation, TrackedEvent
 from suboctave.bifurcation.bordered import at_values, branching_equation, null_vectors
 from suboctave.continuation import CurvePoint, NewtonOptions, SteppingOptions
@@ -57,7 +58,7 @@ from suboctave.results.equilibria import as_equilibria
 @timed
 def frequency_response(
     system: System,
-    omega: tuple[float, float],
+    omega: Range,
     *,
     harmonics: Harmonics = "adaptive",
     start: Any = None,
@@ -125,7 +126,7 @@ def frequency_response(
 def continue_branch(
     start: System | PeriodicOrbit | BranchPoint | Bifurcation,
     parameter: str,
-    bounds: tuple[float, float],
+    bounds: Range,
     *,
     omega: float | None = None,
     harmonics: Harmonics | None = None,
@@ -183,7 +184,7 @@ def continue_branch(
 def _from_system(
     system: System,
     parameter: str,
-    bounds: tuple[float, float],
+    bounds: Range,
     omega: float | None,
     wanted: Harmonics,
     options: CurveOptions,
@@ -265,7 +266,7 @@ def switch_branch(
     bifurcation: Bifurcation,
     *,
     side: int | None = None,
-    bounds: tuple[float, float] | None = None,
+    bounds: Range | None = None,
     harmonics: Harmonics | None = None,
     **options: Unpack[CurveOptions],
 ) -> Branch:

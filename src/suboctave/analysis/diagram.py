@@ -16,6 +16,7 @@ from typing import Any, Protocol, Unpack
 
 from suboctave.analysis.branches import frequency_response, switch_branch
 from suboctave.analysis.options import CurveOptions, SearchOptions, handed_on
+from suboctave.arguments import Range
 from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.curves.junction import Junction
 from suboctave.curves.starts import Harmonics
@@ -81,7 +82,7 @@ class Followed:
 @timed
 def bifurcation_diagram(
     system: System,
-    omega: tuple[float, float],
+    omega: Range,
     *,
     depth: int = 2,
     harmonics: Harmonics = "adaptive",

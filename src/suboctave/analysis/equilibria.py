@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from suboctave.analysis.branches import from_end
 from suboctave.analysis.options import CurveOptions, CurveRun, settings_of
+from suboctave.arguments import Range
 from suboctave.curves.still import BEYOND, STILL, beyond, fastest
 from suboctave.errors import ConvergenceError, InputError, is_number, shortened
 from suboctave.model.inputs import check_bounds, check_is_system, check_parameter, numbers_of, timed
@@ -26,7 +27,7 @@ _TRIES = 4
 def equilibria(
     system: System,
     parameter: str,
-    bounds: tuple[float, float],
+    bounds: Range,
     *,
     start: ArrayLike | None = None,
     highest: float | None = None,

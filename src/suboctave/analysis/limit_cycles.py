@@ -11,6 +11,7 @@ import numpy as np
 from suboctave.analysis.equilibria import check_undriven
 from suboctave.analysis.options import Inherited, TrackOptions
 from suboctave.analysis.track import track
+from suboctave.arguments import Range
 from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.continuation.linear import length
 from suboctave.continuation.newton import NewtonOptions, correct
@@ -54,9 +55,9 @@ _TOLD = 0.2
 def limit_cycles(
     start: Bifurcation | BranchPoint | PeriodicOrbit,
     parameter: str | None = None,
-    bounds: tuple[float, float] | None = None,
+    bounds: Range | None = None,
     *,
-    omega: tuple[float, float] | None = None,
+    omega: Range | None = None,
     harmonics: int | str | AdaptiveHarmonics = "adaptive",
     unloaded: bool = False,
     **options: Unpack[TrackOptions],

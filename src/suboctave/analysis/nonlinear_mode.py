@@ -11,6 +11,7 @@ from typing import Any, Unpack
 import numpy as np
 
 from suboctave.analysis.options import TrackOptions, options_of, settings_of
+from suboctave.arguments import Range
 from suboctave.bifurcation.gaps import rests_in_corner
 from suboctave.continuation import CurvePoint, March
 from suboctave.continuation.linear import length, one_thread
@@ -54,8 +55,6 @@ _ABOVE = 1.5
 _CONSERVATIVE = 1e-6
 #: share of a matrix that is rounding
 _ROUNDING = 1e-12
-
-Range = tuple[float, float]
 
 
 @with_options(TrackOptions)

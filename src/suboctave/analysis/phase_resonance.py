@@ -16,6 +16,7 @@ from suboctave.analysis.branches import frequency_response
 from suboctave.analysis.options import TrackOptions, handed_on
 from suboctave.analysis.subharmonics import Branches, find_subharmonics
 from suboctave.analysis.track import track
+from suboctave.arguments import Range
 from suboctave.curves.starts import Harmonics
 from suboctave.curves.trace import BranchPoint
 from suboctave.errors import ConvergenceError, InputError
@@ -32,9 +33,9 @@ from suboctave.results.branch import Branch, TrackedBranch
 @timed
 def phase_resonance(
     system: System,
-    omega: tuple[float, float],
+    omega: Range,
     parameter: str,
-    bounds: tuple[float, float],
+    bounds: Range,
     *,
     harmonic: int = 1,
     subharmonic: int = 1,

@@ -24,7 +24,7 @@ from suboctave.continuation.linear import length, one_thread
 from suboctave.curves.kinds.multiple import MultipleEquations
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.tracked.start import curve_through, is_extremum, on_free_phase, with_extremum
-from suboctave.errors import InputError, shortened, suggest
+from suboctave.errors import InputError, UnknownName, shortened, suggest
 from suboctave.harmonic.basis import Array
 from suboctave.kinds import TRACKED_KINDS
 
@@ -63,8 +63,8 @@ class Sensitivity(Mapping[str, Mapping[str, float]]):
     derivatives: Mapping[str, Mapping[str, float]]
 
     def __getitem__(self, name: str) -> Mapping[str, float]:
-        if name not in self.derivatives:
-            raise InputError(f"no derivative by {name!r}{suggest(str(name), self.derivatives)}")
+        if not isinstance(name, str) or name not in self.derivatives:
+            raise UnknownName(f"no derivative by {shortened(name)}{suggest(str(name), self.derivatives)}")
         return self.derivatives[name]
 
     def __iter__(self) -> Iterator[str]:

@@ -17,7 +17,7 @@ import numpy as np
 
 from suboctave.analysis.free_vibrations import Backbone, backbones
 from suboctave.analysis.options import CurveOptions, CurveRun, SearchOptions, settings_of
-from suboctave.arguments import Count, checked
+from suboctave.arguments import Count, Range, checked
 from suboctave.continuation import CurvePoint, NewtonOptions
 from suboctave.continuation.linear import one_thread
 from suboctave.continuation.newton import correct
@@ -71,7 +71,7 @@ def check_order(order: Any) -> int:
 @limited
 def find_subharmonics(
     system: System,
-    omega: tuple[float, float],
+    omega: Range,
     *,
     subharmonic: int,
     harmonics: Harmonics = "adaptive",
@@ -125,7 +125,7 @@ class Branches(list[Branch]):
 
 def isolated_branches(
     system: System,
-    omega: tuple[float, float],
+    omega: Range,
     order: int,
     known: Sequence[Branch],
     harmonics: Harmonics,

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from suboctave.analysis.options import CurveOptions, Inherited, check_inside, options_of, settings_of
+from suboctave.arguments import Range
 from suboctave.bifurcation.bifurcation import Bifurcation, TrackedEvent
 from suboctave.bifurcation.bordered import doubled_direction, null_vectors
 from suboctave.continuation import CurvePoint
@@ -36,7 +37,6 @@ from suboctave.progress import reporting
 from suboctave.results.branch import TrackedBranch
 from suboctave.results.modes import tracked_class
 
-Range = tuple[float, float]
 #: share of odd harmonics up to which a motion may have half the period
 _FAINT = 1e-3
 

@@ -27,6 +27,7 @@ from typing import Any, Unpack
 import numpy as np
 
 from suboctave.analysis.options import Inherited, TrackOptions, check_inside, options_of, settings_of
+from suboctave.arguments import Range
 from suboctave.bifurcation.bifurcation import CURVES_THROUGH, Bifurcation, TrackedEvent, kind_of
 from suboctave.bifurcation.bordered import null_vectors, transversality
 from suboctave.continuation import CurvePoint, NewtonOptions, SteppingOptions
@@ -65,8 +66,6 @@ from suboctave.progress import reporting
 from suboctave.results.branch import TrackedBranch
 from suboctave.results.modes import tracked_class
 
-Range = tuple[float, float]
-
 #: a curve of bifurcations is drawn by its points, and those in its turns cost little
 _STEPPING = SteppingOptions(angle=0.15, growth=4.0)
 #: what a curve of multiple bifurcations says
@@ -78,7 +77,7 @@ _MULTIPLE = Note("extrema are located along multiple bifurcations, points of cod
 def track(
     bifurcation: Bifurcation | BranchPoint,
     parameter: str | Sequence[str],
-    bounds: Sequence[Any],
+    bounds: Range | Sequence[Range],
     *,
     omega: Range | None = None,
     onto: str | Mapping[str, Any] | None = None,

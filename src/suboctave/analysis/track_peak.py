@@ -8,6 +8,7 @@ import numpy as np
 
 from suboctave.analysis.options import TrackOptions
 from suboctave.analysis.track import track
+from suboctave.arguments import Range
 from suboctave.curves.trace import BranchPoint
 from suboctave.errors import InputError, is_number, shortened
 from suboctave.harmonic.basis import Array
@@ -21,7 +22,7 @@ from suboctave.results.branch import Branch, TrackedBranch
 def track_peak(
     response: Branch | BranchPoint,
     parameter: str,
-    bounds: tuple[float, float],
+    bounds: Range,
     *,
     harmonic: float | None = None,
     **options: Unpack[TrackOptions],

@@ -15,7 +15,7 @@ from typing import Annotated, Any, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
-from suboctave.arguments import Count, Index, checked
+from suboctave.arguments import Count, Index, Range, checked
 from suboctave.errors import InputError, suggest
 from suboctave.experiments.common import (
     FEW,
@@ -161,7 +161,7 @@ def brute_force_diagram(
     system: System,
     omega: Any,
     parameter: str | None = None,
-    bounds: tuple[float, float] | None = None,
+    bounds: Range | None = None,
     *,
     values: int | Sequence[float] = 200,
     direction: str | Sequence[str] = ("up", "down"),

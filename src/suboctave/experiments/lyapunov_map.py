@@ -9,7 +9,7 @@ from typing import Annotated, Any, Protocol, Unpack, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from suboctave.arguments import Count, Index, Positive, checked
+from suboctave.arguments import Count, Index, Positive, Range, checked
 from suboctave.errors import InputError
 from suboctave.experiments.common import (
     On,
@@ -120,9 +120,9 @@ class LyapunovMap(TimeResult):
 @of_structures
 def lyapunov_map(
     system: System,
-    omega: tuple[float, float],
+    omega: Range,
     parameter: str,
-    bounds: tuple[float, float],
+    bounds: Range,
     *,
     grid: tuple[int | Sequence[float], int | Sequence[float]] = (60, 40),
     start: Any = None,

@@ -21,7 +21,7 @@ from typing import Annotated, Any, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
-from suboctave.arguments import checked
+from suboctave.arguments import Range, checked
 from suboctave.errors import InputError, is_number, shortened, suggest
 from suboctave.experiments.common import (
     FEW,
@@ -54,7 +54,7 @@ _SAMPLES = 128
 @of_structures
 def stepped_sine(
     system: System,
-    omega: tuple[float, float],
+    omega: Range,
     *,
     values: int | Sequence[float] = 201,
     direction: str | Sequence[str] = "up",

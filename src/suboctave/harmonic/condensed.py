@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
-from suboctave.arguments import checked
+from suboctave.arguments import Range, checked
 from suboctave.errors import ConvergenceError, InputError, shortened
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.elimination import ComplexModes, Stack, complex_modes
@@ -393,7 +393,7 @@ def linear_part_of(
 @checked
 def condense(
     system: System,
-    omega: float | tuple[float, float],
+    omega: float | Range,
     *,
     harmonics: int = 15,
     observe: int | str | Sequence[int | str] = (),

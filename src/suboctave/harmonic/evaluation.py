@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from suboctave.arguments import checked
-from suboctave.errors import NotFiniteError
+from suboctave.errors import InputError, NotFiniteError
 from suboctave.harmonic.aft.channel import Channel, Group, laws_along
 from suboctave.harmonic.aft.law import Along, LawAlong, LocalMotion
 from suboctave.harmonic.aft.table import PackedLaws
@@ -76,6 +76,9 @@ class HarmonicBalance(Equations):
             If an element returns a force that is not finite.
         """
         used = self.values if values is None else values
+        if len(used) < len(self.values):
+            missing = [name for name in self.values if name not in used]
+            raise InputError(f"values leaves out {', '.join(missing)}: give all parameters, or none for the system's")
         return BalanceState(self, self.linear_at(omega, used), self.shaped(np.asarray(x, float)), float(omega), used)
 
     def linear_at(self, omega: float, values: Mapping[str, float]) -> LinearPart:

@@ -25,11 +25,15 @@ __all__ = [
     "jeffcott_rotor",
     "mathieu_duffing",
     "nltva",
-    "nondimensional",
     "reference_oscillator",
     "reference_oscillator_physical",
     "two_mass_unilateral",
 ]
+
+
+def __dir__() -> list[str]:
+    """The systems alone."""
+    return __all__
 
 
 def _forced(

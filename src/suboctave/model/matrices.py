@@ -134,6 +134,16 @@ class MatrixCoefficient:
             self._derivatives[name] = slope if slope.coefficients or largest_entry(slope._base) else None
         return self._derivatives[name]
 
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> Array:
+        if self.names:
+            raise InputError(
+                f"{self.what} depends on {', '.join(sorted(self.names))}: system.matrices() has its numbers at the "
+                "system's parameters"
+            )
+        if copy is False:
+            raise ValueError(f"{self.what} is made anew as an array: leave copy out")
+        return self.value({}).astype(dtype or float)
+
     def __repr__(self) -> str:
         kind = "sparse" if self.sparse else "dense"
         inside = f" in {', '.join(sorted(self.names))}" if self.names else ""

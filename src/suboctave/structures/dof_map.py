@@ -11,21 +11,23 @@ import difflib
 import operator
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, TypeAlias
+from typing import Annotated, Any, TypeAlias
 
 import numpy as np
 
-from suboctave.arguments import checked
+from suboctave.arguments import READ, checked
 from suboctave.errors import InputError, shortened, suggest
 from suboctave.model.elements.base import Array
 from suboctave.model.loads import DIRECTIONS
 
 Node: TypeAlias = int | str
 Label: TypeAlias = tuple[Node, str]
-
+#: a node or a direction, and labels, as users give them
+GivenName: TypeAlias = Annotated[int | str, READ]
+GivenLabels: TypeAlias = Annotated[Iterable[tuple[int | str, int | str]], READ]
 
 #: other names of the directions: numbers, those of Ansys (UX, ROTX), of Nastran (T1, R1)
 _OTHER_NAMES = {
@@ -94,7 +96,7 @@ class DofMap:
     labels: tuple[Label, ...]
     fixed: frozenset[Label]
 
-    def __init__(self, labels: Any, fixed: Any = ()) -> None:
+    def __init__(self, labels: GivenLabels, fixed: GivenLabels = ()) -> None:
         object.__setattr__(self, "labels", _labels(labels))
         object.__setattr__(self, "fixed", frozenset(_labels(fixed)))
         if len(self._places) < len(self.labels):
@@ -118,7 +120,7 @@ class DofMap:
         """The labels as texts, "1042 z"."""
         return tuple(map(_text, self.labels))
 
-    def index(self, node: Any, direction: Any = None) -> int:
+    def index(self, node: GivenName, direction: GivenName | None = None) -> int:
         """The number, from 0, of the degree of freedom of a node in a direction; or of a text like "1042 z".
 
         Raises `InputError` with what there is near it.
@@ -262,3 +264,7 @@ def _both(text: Any) -> tuple[str, str]:
 
 def _text(label: Label) -> str:
     return f"{label[0]} {label[1]}"
+
+
+#: what a structure has, once it is made; pairs (node, direction) are read into it
+GivenDofs: TypeAlias = Annotated[DofMap | None, READ]

@@ -30,7 +30,7 @@ from suboctave.structures import (
     output4,
 )
 from suboctave.structures.contents import Contents, chosen, matrix_of
-from suboctave.structures.dof_map import DofMap, direction_label, node_label
+from suboctave.structures.dof_map import DofMap, GivenLabels, direction_label, node_label
 from suboctave.structures.mesh import Mesh
 from suboctave.structures.structure import MatrixOrForm, Structure
 from suboctave.structures.text_lines import text_of
@@ -66,7 +66,7 @@ def read_structure(
     stiffness: FileName | None = None,
     mass: FileName | None = None,
     damping: MatrixOrForm = None,
-    dofs: Any = None,
+    dofs: GivenLabels | DofMap | FileName | None = None,
     mesh: Mesh | None = None,
     name: Title | None = None,
     structural: MatrixOrForm = None,

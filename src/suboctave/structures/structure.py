@@ -20,7 +20,7 @@ from suboctave.model.system import System
 from suboctave.model.updated import part_of
 from suboctave.structures.checks import inertia_checked, square_matrix, symmetric_matrix
 from suboctave.structures.damping import ModalDamping, Rayleigh, written_out
-from suboctave.structures.dof_map import DofMap, shown_dofs, weighted
+from suboctave.structures.dof_map import DofMap, GivenDofs, GivenName, shown_dofs, weighted
 from suboctave.structures.mesh import Mesh
 from suboctave.structures.numpy_files import write
 
@@ -57,7 +57,7 @@ class Structure:
     mass: Matrix
     stiffness: Matrix
     damping: MatrixOrForm = None
-    dofs: Any = None
+    dofs: GivenDofs = None
     mesh: Mesh | None = None
     name: Title = ""
     structural: MatrixOrForm = None
@@ -105,7 +105,7 @@ class Structure:
         """The degrees of freedom without inertia: rotations of solid elements, multipliers of constraints."""
         return tuple(np.flatnonzero(self.mass.diagonal() == 0.0).tolist())
 
-    def dof(self, node: Any, direction: Any = None) -> int:
+    def dof(self, node: GivenName, direction: GivenName | None = None) -> int:
         """The number, from 0, of the degree of freedom of a node in a direction: an element's `dof`.
 
         `node`: 1042, "1042", "node 1042"; or a text of both, "1042 z". `direction`: x, y, z, rx, ry, rz in any case, or

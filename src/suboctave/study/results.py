@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from suboctave.arguments import checked
 from suboctave.atomic import free_place
-from suboctave.errors import InputError, suggest
+from suboctave.errors import InputError, UnknownName, shortened, suggest
 from suboctave.experiments.common import TimeResult
 from suboctave.harmonic.linear_part import LinearPart
 from suboctave.maps.isolas.map import IsolaMap
@@ -46,12 +46,9 @@ class Results(Mapping[str, Result]):
     details: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> Result:
-        if name not in self.items_by_name:
-            raise InputError(f"there is no analysis {name!r}{suggest(str(name), self.items_by_name)}")
+        if not isinstance(name, str) or name not in self.items_by_name:
+            raise UnknownName(f"there is no analysis {shortened(name)}{suggest(str(name), self.items_by_name)}")
         return self.items_by_name[name]
-
-    def __contains__(self, name: object) -> bool:
-        return name in self.items_by_name
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.items_by_name)

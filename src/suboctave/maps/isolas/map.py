@@ -23,7 +23,7 @@ import numpy as np
 
 from suboctave.analysis.options import SearchOptions
 from suboctave.analysis.track import track
-from suboctave.arguments import Positive, checked
+from suboctave.arguments import Positive, Range, checked
 from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.continuation.problem import Array
 from suboctave.curves.identity import lies_on
@@ -53,7 +53,7 @@ _AGREES = 1e-3
 def isola_map(
     isolas: Isola | Isolas | Sequence[Isola],
     parameter: str,
-    bounds: tuple[float, float],
+    bounds: Range,
     *,
     probes: int | Sequence[float] = 3,
     max_step: Positive | None = None,

@@ -24,6 +24,7 @@ import numpy as np
 from suboctave.analysis.branches import continue_branch
 from suboctave.analysis.options import DesignOptions
 from suboctave.analysis.subharmonics import Seeds
+from suboctave.arguments import Range
 from suboctave.curves.identity import lies_on
 from suboctave.curves.junction import period_name
 from suboctave.curves.starts import Harmonics
@@ -42,9 +43,9 @@ from suboctave.workers import check_workers
 @timed
 def find_isolas(
     system: System,
-    omega: tuple[float, float],
+    omega: Range,
     parameter: str,
-    bounds: tuple[float, float],
+    bounds: Range,
     *,
     harmonics: Harmonics = "adaptive",
     values: int | Sequence[float] = 5,

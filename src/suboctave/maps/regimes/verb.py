@@ -25,6 +25,7 @@ from suboctave.analysis.branches import continue_branch, frequency_response
 from suboctave.analysis.diagram import Followed, grown_from
 from suboctave.analysis.options import DesignOptions
 from suboctave.analysis.subharmonics import Seeds
+from suboctave.arguments import Range
 from suboctave.bifurcation.bifurcation import Bifurcation, TrackedEvent
 from suboctave.curves.identity import lies_on, mirrored
 from suboctave.curves.junction import period_name
@@ -70,9 +71,9 @@ _SAMPLES = (0.1, 0.3, 0.5, 0.7, 0.9)
 @timed
 def regime_map(
     system: System,
-    omega: tuple[float, float],
+    omega: Range,
     parameter: str,
-    bounds: tuple[float, float],
+    bounds: Range,
     *,
     harmonics: Harmonics = "adaptive",
     depth: int = 2,
