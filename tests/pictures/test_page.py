@@ -12,7 +12,7 @@ import xarray
 
 import suboctave as so
 from suboctave.pictures.drawing import Axis, Drawing, Entry, Frame, Raster
-from suboctave.pictures.paper import save_or_show
+from suboctave.pictures.paper import finished
 from suboctave.pictures.report import write_report
 from suboctave.pictures.style import sheet_of
 from suboctave.store.table import Table
@@ -180,7 +180,7 @@ def test_a_place_in_a_map_says_what_is_there(study, tmp_path):
             frame = Frame([Raster(cells, np.array([2.0, 2.3, 2.6]), np.array([0.0, 0.1, 0.2]), layer=0.0)])
             frame.entries |= {"one motion": Entry(patch="#ffffff"), "two motions": Entry(patch="#000000")}
             drawing = Drawing([Axis("omega", 2.0, 2.6), Axis("j", 0.0, 0.2)], [frame])
-            return save_or_show(drawing, sheet_of((5.0, 4.0)), path)
+            return finished(drawing, sheet_of((5.0, 4.0)), path, {})
 
     path = write_report({"near": study["near"], "map": Map()}, tmp_path / "map.html")
     with closing(chromium.Page(tmp_path / "profile")) as page:

@@ -16,8 +16,7 @@ Isolas are drawn from the dataset that `suboctave.store.layout` describes, given
 
 from __future__ import annotations
 
-import inspect
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
@@ -28,8 +27,9 @@ from suboctave.kinds import KINDS
 from suboctave.options import with_options
 from suboctave.pictures import strokes, style
 from suboctave.pictures.drawing import Axis, Beads, Drawing, Entry, Frame, Label, Markers, Region, Surface, plain
-from suboctave.pictures.options import Coordinates, SpaceOptions, View
-from suboctave.pictures.paper import save_or_show
+from suboctave.pictures.given import datasets_of, is_boundary, is_isolas, named_within, several_of
+from suboctave.pictures.options import Coordinates, FrameOptions, SpaceOptions, View
+from suboctave.pictures.paper import finished
 from suboctave.pictures.strokes import Seen, Verdict, add_strokes, checked, events_of, line_through, named_axis, seen_as
 from suboctave.pictures.style import Mark, Pen, period_colour, period_name, period_of, places_among, tinted
 from suboctave.store.layout import coordinate
@@ -54,17 +54,17 @@ _STAGE = 0.4
 _APART = ((0.0, 1.0), (0.45, 0.7), (0.25, 1.4))
 
 
+@with_options(FrameOptions)
 def plot_boundaries(
-    curves: xarray.Dataset | Sequence[xarray.Dataset],
+    curves: Any,
     path: str | Path | None = None,
     *,
     x: str | None = None,
     y: str | None = None,
     labels: Sequence[str] | None = None,
-    title: str | None = None,
-    size: str | tuple[float, float] = (6.4, 4.2),
     view: View | None = None,
     projected: bool = False,
+    **options: Unpack[FrameOptions],
 ) -> Figure:
     """One or several curves of bifurcations over the plane of two parameters, saved to `path` where one is given.
 
@@ -82,12 +82,12 @@ def plot_boundaries(
     projected
         The quantity of the view is drawn upwards, over `x` (default: the first of the two).
 
-    Others as `suboctave.plot`. Raises InputError for what cannot be drawn.
+    Raises InputError for what cannot be drawn.
     """
     several: list[Any] = list(curves) if isinstance(curves, list | tuple) else [curves]
     drawing = boundary_drawing(several, x=x, y=y, labels=labels, view=view, projected=projected)
-    drawing.frames[0].title = plain(title or "")
-    return save_or_show(drawing, style.sheet_of(size), path)
+    drawing.frames[0].title = plain(options.get("title") or "")
+    return finished(drawing, style.sheet_of(options.get("size") or (6.4, 4.2)), path, options)
 
 
 def boundary_drawing(
@@ -116,7 +116,7 @@ def boundary_drawing(
     strokes.check_count("labels", labels, len(group), "curves")
     for dataset in group:
         axes.check(dataset)
-    names = [plain(name) for name in (labels if labels is not None else boundary_names(group))]
+    names = boundary_names(group) if labels is None else [plain(label) for label in labels]
     pens = boundary_styles(group, names)
     limits = axes.limits(group, _MARGIN, _MARGIN)
     spread = (limits[0][1] - limits[0][0], limits[1][1] - limits[1][0])
@@ -153,9 +153,6 @@ def boundary_drawing(
 
 
 # --------------------------------------------------------------------------------------------------------------- curves
-def is_boundary(dataset: xarray.Dataset) -> bool:
-    """Whether a dataset is that of a curve of bifurcations in two parameters."""
-    return bool(dataset.attrs.get("tracked"))
 
 
 def kind_of(dataset: xarray.Dataset) -> str:
@@ -170,7 +167,11 @@ def plane_of(dataset: xarray.Dataset) -> tuple[str, str]:
 
 
 def boundary_names(group: Sequence[xarray.Dataset]) -> list[str]:
-    """Kind and period of each, and the parameters in which those of one kind and period differ."""
+    """Kind and period of each, and the parameters in which those of one kind and period differ; names that the user
+    gave stand for all of this, but among curves of one name.
+    """
+    if any("called" in dataset.attrs for dataset in group):
+        return named_within(group, boundary_names)
     names = []
     for kind, nu in ((kind_of(dataset), period_of(dataset)) for dataset in group):
         periods = f" {period_name(nu)}→{period_name(2 * nu)}" if kind == "PD" else f" of {period_name(nu)}" * (nu > 1)
@@ -320,8 +321,6 @@ def plot_space(
     zlabel: str | None = None,
     elevation: float = 24.0,
     azimuth: float = -58.0,
-    title: str | None = None,
-    size: str | tuple[float, float] = (6.4, 5.0),
     **options: Unpack[SpaceOptions],
 ) -> Figure:
     """Response curves at several values of a parameter, and curves of bifurcations through them, in space.
@@ -340,22 +339,20 @@ def plot_space(
         Text of the vertical axis; `xlabel` and `ylabel` are those of the others.
     elevation, azimuth
         From where it is seen, degrees above the floor and around the vertical axis.
-    title, size
-        As in `suboctave.plot`.
     """
-    view = View(**dict[str, Any](options)).placed(several_of(curves))
+    view = View.of(options).placed(several_of(curves))
     for name, angle in (("elevation", elevation), ("azimuth", azimuth)):
         if isinstance(angle, bool) or not isinstance(angle, int | float) or not np.isfinite(angle):
             raise InputError(f"{name} is an angle in degrees, not {angle!r}")
     drawing = space_drawing(datasets_of(curves, view), x=x, y=y, view=view)
-    drawing.title, drawing.seen_from = plain(title or ""), (float(elevation), float(azimuth))
+    drawing.title, drawing.seen_from = plain(options.get("title") or ""), (float(elevation), float(azimuth))
     if zlabel:
         drawing.axes = [*drawing.axes[:2], Axis(zlabel, drawing.axes[2].low, drawing.axes[2].high)]
-    sheet = style.sheet_of(size)
+    sheet = style.sheet_of(options.get("size") or (6.4, 5.0))
     if sheet.named:  # named sizes are widths: in space more height is needed
         width = sheet.inches[0]
         sheet = style.Sheet((width, 0.8 * width if width < 5.0 else 0.62 * width), sheet.look, named=True)
-    return save_or_show(drawing, sheet, path)
+    return finished(drawing, sheet, path, options)
 
 
 def space_drawing(
@@ -431,7 +428,7 @@ def _add_boundaries(
 ) -> None:
     """Curves of bifurcations, as given and with the ends of isolas among their events, and their projections."""
     within = set[Verdict]()
-    names = [plain(name) for name in boundary_names([dataset for dataset, _ in bounds])]
+    names = boundary_names([dataset for dataset, _ in bounds])
     pens = boundary_styles([dataset for dataset, _ in bounds], names)
     for (given, dataset), name, pen in zip(bounds, names, pens, strict=True):
         pale, thick = Pen(tinted(pen.colour, _SHADE), 0.7 * pen.width), Pen(pen.colour, _THICK * pen.width, pen.dash)
@@ -497,11 +494,6 @@ _SAME = 1e-8
 _PALE = 0.82
 
 
-def is_isolas(dataset: xarray.Dataset) -> bool:
-    """Whether a dataset is that of isolas."""
-    return bool(dataset.attrs.get("isolas"))
-
-
 def parameter_of(dataset: xarray.Dataset) -> str:
     """The design parameter of a dataset of isolas."""
     return str(dataset.attrs["isolas"])
@@ -547,34 +539,3 @@ def with_ends(dataset: xarray.Dataset, heads: Sequence[xarray.Dataset]) -> xarra
                 near = np.abs(at - value) <= _SAME * max(abs(value), 1e-300)
                 kinds[near & (np.abs(there - omega) <= _SAME * abs(omega))] = kind
     return dataset.assign(event_kind=("event", kinds))
-
-
-# ------------------------------------------------------------------------------------------------- live or from a file
-def datasets_of(curves: Any, view: View) -> list[xarray.Dataset]:
-    """The datasets of what `plot` takes, with the quantity that is drawn."""
-    datasets = [dataset for item in several_of(curves) for dataset in _datasets(item, view)]
-    drawn = iter(view.completed([dataset for dataset in datasets if not is_isolas(dataset)]))
-    return [dataset if is_isolas(dataset) else next(drawn) for dataset in datasets]
-
-
-def several_of(curves: Any) -> list[Any]:
-    """The branches and diagrams of what is given."""
-    named = getattr(curves, "branches", None)
-    if isinstance(named, Mapping):  # results of a study
-        others = (getattr(curves, kind, {}).values() for kind in ("diagrams", "isolas"))
-        return [*named.values(), *(item for group in others for item in group)]
-    return list(curves) if isinstance(curves, list | tuple) else [curves]
-
-
-def _datasets(item: Any, view: View) -> list[xarray.Dataset]:
-    """The dataset of a branch, those of all branches of a diagram."""
-    import xarray
-
-    if isinstance(item, xarray.Dataset):
-        return [item]
-    laid_out = getattr(item, "to_xarray", None)
-    if laid_out is None or "readings" not in inspect.signature(laid_out).parameters:
-        kind, own = type(item).__name__, ", which is drawn by its own plot()" if hasattr(item, "plot") else ""
-        raise InputError(f"plot draws branches, diagrams, isolas and their datasets, not {kind}{own}")
-    given = laid_out(readings=view.readings(getattr(item, "nu", 0)))
-    return list(given.values()) if isinstance(given, dict) else [given]

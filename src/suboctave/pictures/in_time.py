@@ -15,8 +15,9 @@ import numpy as np
 
 from suboctave.errors import GivenDof, InputError, chosen_dof, suggest
 from suboctave.pictures import style
-from suboctave.pictures.boundary import boundary_drawing, datasets_of, is_boundary
+from suboctave.pictures.boundary import boundary_drawing
 from suboctave.pictures.drawing import STROKES, Axis, Band, Entry, Frame, Guide, Markers, Polyline, Raster, dot, plain
+from suboctave.pictures.given import datasets_of, is_boundary
 from suboctave.pictures.options import (
     Coordinates,
     View,
@@ -111,7 +112,7 @@ def plot_brute_force(
     varied = str(diagram.attrs["varied"])
     values = diagram["value"].to_numpy()
     low, high = _limits(values)
-    frame = _beneath(curves, varied, View(xlim=(low, high)))
+    frame = _beneath(curves, varied, View())
     # beside curves, whose periods have the same names, marks say that they are motions in time
     suffix = "" if curves is None else ", in time"
     for start in shown:
@@ -131,8 +132,6 @@ def plot_stepped_sine(
     measured: Any = None,
     harmonic: float = 1,
     dof: GivenDof | None = None,
-    xlim: Sequence[float] | None = None,
-    ylim: Sequence[float] | None = None,
 ) -> Layout:
     """The modulus of a component at each step: upward and downward triangles, coloured by the period of the motion.
 
@@ -144,18 +143,14 @@ def plot_stepped_sine(
         `Measured`, or several of them; of the fundamental only.
     harmonic, dof
         Which multiple of omega; which degree of freedom (default the observed one).
-    xlim, ylim
-        Part of the axes that is shown, (from, to); default the frequencies of the test, and all amplitudes.
     """
     dof = checked_dof(test, dof)
     harmonic = as_multiple(harmonic)
     listed = _measured(measured, harmonic)
-    limits = View(xlim=xlim, ylim=ylim)
     values = _component(test, harmonic, dof)
     omega, periods = test["omega"].to_numpy(), test["period"].to_numpy()
-    low, high = limits.xlim or _limits(np.concatenate([omega, *(one.omega for one in listed)]))
-    shown = View("harmonic", harmonic, None, dof, xlim=(low, high), ylim=limits.ylim)
-    frame = _beneath(curves, "omega", shown)
+    low, high = _limits(np.concatenate([omega, *(one.omega for one in listed)]))
+    frame = _beneath(curves, "omega", View("harmonic", harmonic, None, dof))
     for s, direction in enumerate(test["direction"].to_numpy()):
         for period in sorted({int(p) for p in periods[s] if p >= 0}, key=lambda p: (p == 0, p)):
             here = periods[s] == period
@@ -169,7 +164,7 @@ def plot_stepped_sine(
         marks = Markers(at, Mark("+", 5.0, colour, colour), cut=True, role="measured", layer=4.2)
         frame.add(marks, plain(one.label))
     symbol = f"X_{{{shown_multiple(harmonic)}}}" + ("" if test.attrs["dofs"] == 1 else f"^{{({dof})}}")
-    axes = Axis(r"$\omega$", low, high), Axis(f"$|{symbol}|$", *(limits.ylim or (0.0, None)))
+    axes = Axis(r"$\omega$", low, high), Axis(f"$|{symbol}|$", 0.0)
     return frame, axes
 
 

@@ -45,8 +45,6 @@ def plot_regimes(
     labels: Sequence[str] | None = None,
     smallest: float = 5e-4,
     missing: str = "",
-    xlabel: str | None = None,
-    ylabel: str | None = None,
 ) -> Layout:
     """Colour a raster of regimes.
 
@@ -88,7 +86,7 @@ def plot_regimes(
     for kind, x, y in lines if curves else ():
         pen = Pen(style.INK, 0.65, _DASHES.get(kind, style.STABLE_DASH))
         frame.add(Polyline(np.array([x, y]), pen, role=kind), style.kind_style(kind).name)
-    axes = Axis(xlabel or names[0], *ranges[0]), Axis(ylabel or names[1], *ranges[1])
+    axes = Axis(names[0], *ranges[0]), Axis(names[1], *ranges[1])
     return frame, axes
 
 
@@ -135,10 +133,6 @@ def plot_isola_map(
     names: tuple[str, str],
     *,
     bounds: tuple[float, float],
-    xlim: Sequence[float] | None = None,
-    ylim: Sequence[float] | None = None,
-    xlabel: str | None = None,
-    ylabel: str | None = None,
 ) -> Layout:
     """Shaded regions over two design parameters, `names` to the right and upwards.
 
@@ -148,7 +142,7 @@ def plot_isola_map(
         For each the period of its motions ("2T"); its outline (values to the right, lower and upper end); the pieces of
         its lower and of its upper border (what it is, to the right, upwards).
     bounds
-        What is shown of the parameter to the right, unless `xlim` says otherwise.
+        What is shown of the parameter to the right.
     """
     frame = Frame()
     for period, (values, low, high), borders in regions:
@@ -157,11 +151,9 @@ def plot_isola_map(
         frame.add(Region(outline, colour, role="isola", layer=1.0), f"{period} isola")
         for words, x, y in (piece for pieces in borders for piece in pieces):
             frame.add(Polyline(np.array([x, y]), _BORDERS[words], role=words), words)
-    upwards: Any = ylim
-    if ylim is None and frame.items:
+    upwards: Any = (None, None)
+    if frame.items:
         every = [i.outline if isinstance(i, Region) else i.at for i in frame.items if isinstance(i, Region | Polyline)]
         bottom, top = (float(end(np.concatenate(every, axis=1)[1])) for end in (np.nanmin, np.nanmax))
         upwards = bottom - 0.12 * (top - bottom), top + 0.12 * (top - bottom)
-    across = bounds if xlim is None else xlim
-    axes = Axis(xlabel or names[0], across[0], across[1]), Axis(ylabel or names[1], *(upwards or (None, None)))
-    return frame, axes
+    return frame, (Axis(names[0], *bounds), Axis(names[1], *upwards))

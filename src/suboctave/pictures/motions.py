@@ -26,7 +26,7 @@ from suboctave.options import with_options
 from suboctave.pictures import style
 from suboctave.pictures.drawing import Axis, Drawing, Entry, Frame, Guide, Markers, Polyline, Ticks, plain
 from suboctave.pictures.options import DERIVATIVES, HistoryOptions, MotionOptions, MotionView, SpectrumOptions
-from suboctave.pictures.paper import check_path, save_or_show
+from suboctave.pictures.paper import check_path, finished
 from suboctave.pictures.strokes import check_count, differing
 from suboctave.pictures.style import Mark, Pen, curve_styles, period_colour, period_name, period_of, styles_of_periods
 
@@ -155,7 +155,7 @@ class MotionDrawing:
         if len(dofs) > 1:
             raise InputError(f"the motions are of different degrees of freedom ({dofs}): choose one with dof=")
         self.datasets, self.view, self.overlay = datasets, view, overlay and count > 1
-        self.title, self.path = given.get("title", ""), path
+        self.title, self.path, self.options = given.get("title", ""), path, given
         self.frames = [Frame() for _ in range(1 if overlay else count)]
         self.columns, inches = _page(len(self.frames), 1 if stacked else _COLUMNS, size, cell)
         width, named = inches[0] / self.columns, isinstance(size, str)
@@ -208,13 +208,12 @@ class MotionDrawing:
 
     def figure(self, across: Axis, upwards: Axis) -> Figure:
         """The figure, saved where a path is given."""
-        own = (self.view.xlabel, self.view.ylabel)
-        axes = [replace(a, label=text or a.label) for a, text in zip((across, upwards), own, strict=True)]
         # beside several frames: inside one of them it would seem to be about that one
         legend = "free" if len(self.frames) == 1 else "outside"
         arranged: dict[str, Any] = {"columns": self.columns, "legend": legend, "grid": False, "small": True}
         self.frames[0].entries = self.legend | self.last
-        return save_or_show(Drawing(axes, self.frames, plain(self.title), **arranged), self.sheet, self.path)
+        drawing = Drawing((across, upwards), self.frames, plain(self.title), **arranged)
+        return finished(drawing, self.sheet, self.path, self.options)
 
 
 def _captions(datasets: Sequence[xarray.Dataset], view: MotionView) -> list[list[str]]:

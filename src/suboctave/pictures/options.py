@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Collection, Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, Annotated, Any, TypedDict
 
@@ -46,7 +46,7 @@ _GREEK = {
 
 
 class PageOptions(TypedDict, total=False):
-    """Keywords of every figure: its title and its size."""
+    """Keywords of every picture: its title and its size."""
 
     title: Annotated[str | None, "Title."]
     size: Annotated[
@@ -56,8 +56,29 @@ class PageOptions(TypedDict, total=False):
     ]
 
 
+class AxesOptions(PageOptions, total=False):
+    """Keywords of every figure with axes: where it is drawn, and their texts."""
+
+    ax: Annotated[
+        Any,
+        "Matplotlib axes that it is drawn into, one for each frame, instead of a figure of its own; what stands in "
+        "them stays. The size is theirs.",
+    ]
+    xlabel: Annotated[str | None, "Text of the axis to the right, instead of the one that follows from what is drawn."]
+    ylabel: Annotated[str | None, "The same upwards; in space into the depth."]
+
+
+class FrameOptions(AxesOptions, total=False):
+    """Keywords of every figure in a plane: texts, limits and scales of the axes, see `frames.framed`."""
+
+    xlim: Annotated[Sequence[float] | None, "Part of the axis to the right that is shown, (from, to)."]
+    ylim: Annotated[Sequence[float] | None, "The same upwards, as the axis shows it."]
+    xscale: Annotated[str | None, '"linear" or "log"; values at or below zero are then left out, and counted.']
+    yscale: Annotated[str | None, 'The same upwards, or "dB": 20 times the logarithm of the value in its unit.']
+
+
 class UnitOptions(TypedDict, total=False):
-    """Keywords of every figure of curves or motions: units and texts of the axes, see `Units`."""
+    """Keywords of every figure of curves or motions: its units, see `Units`."""
 
     frequency: Annotated[str | None, '"rad/s" or "Hz", where the system\'s time is in seconds.']
     omega_reference: Annotated[
@@ -71,12 +92,10 @@ class UnitOptions(TypedDict, total=False):
         "one that is no frequency.",
     ]
     unit: Annotated[str | None, 'Its unit for the label, such as `scale=1e3, unit="mm"`.']
-    xlabel: Annotated[str | None, "Text of the axis to the right, instead of the one that follows from the above."]
-    ylabel: Annotated[str | None, "The same upwards; in space into the depth."]
 
 
-class SpaceOptions(UnitOptions, total=False):
-    """Keywords of `plot_space`: the quantity of curves, see `View`, and its units."""
+class QuantityOptions(UnitOptions, total=False):
+    """Keywords of every figure of curves: their quantity, see `View`, and its units."""
 
     quantity: Annotated[
         str | Callable[[Any], float] | None,
@@ -91,22 +110,27 @@ class SpaceOptions(UnitOptions, total=False):
         "two load periods, which is zero for those of one.",
     ]
     element: Annotated[int | None, "Of which element, by index."]
-    dof: Annotated[GivenDof | None, "Of which degree of freedom, its number or its name; default the observed one."]
+    dof: Annotated[
+        GivenDof | list[GivenDof] | None,
+        "Of which degree of freedom, its number or its name, or of which ones, a list; default the observed one.",
+    ]
 
 
-class CurveOptions(SpaceOptions, total=False):
-    """Keywords of `plot`: the quantity of curves, its units, and what of the frame is shown, see `View`."""
+class SpaceOptions(QuantityOptions, AxesOptions, total=False):
+    """Keywords of `plot_space`."""
 
-    xlim: Annotated[Sequence[float] | None, "Part of the axis to the right that is shown, (from, to)."]
-    ylim: Annotated[Sequence[float] | None, "The same upwards."]
+
+class CurveOptions(QuantityOptions, FrameOptions, total=False):
+    """Keywords of `plot`: the quantity of curves, its units, and what of the frame is shown."""
+
     marks: Annotated[
         Sequence[str] | None,
         'Kinds of bifurcations that get markers, ["PD", "LP"]; default all, of a diagram all but grazing contacts.',
     ]
 
 
-class MotionOptions(UnitOptions, PageOptions, total=False):
-    """Keywords of every figure of motions: which motions, how they are arranged, units and texts of the axes."""
+class MotionOptions(UnitOptions, FrameOptions, total=False):
+    """Keywords of every figure of motions: which motions, how they are arranged, their units, and the frame."""
 
     points: Annotated[Sequence[int] | None, "Which points of the branches, by index."]
     dof: Annotated[
@@ -132,14 +156,12 @@ class HistoryOptions(SpectrumOptions, total=False):
 
 @dataclass(frozen=True, kw_only=True)
 class Units:
-    """Units and texts of the axes: what `UnitOptions` says of each. Phases are in degrees unless scaled."""
+    """Units of the axes: what `UnitOptions` says of each. Phases are in degrees unless scaled."""
 
     frequency: str | None = None
     omega_reference: float | None = None
     scale: float | None = None
     unit: str | None = None
-    xlabel: str | None = None
-    ylabel: str | None = None
 
     def __post_init__(self) -> None:
         frequency, reference = self.frequency, self.omega_reference
@@ -192,9 +214,7 @@ class View(Units):
     quantity: str | Callable[[Any], float] = ""
     harmonic: Any = None
     element: int | None = None
-    dof: GivenDof | None = None
-    xlim: Sequence[float] | None = None
-    ylim: Sequence[float] | None = None
+    dof: GivenDof | list[GivenDof] | None = None
     marks: Sequence[str] | None = None
 
     def __post_init__(self) -> None:
@@ -213,11 +233,13 @@ class View(Units):
         if self.dof is not None and not self.kind.of_dof:
             raise InputError(f"the quantity {self.called!r} is not one of a degree of freedom: leave dof= out")
         super().__post_init__()
-        for name, limits in (("xlim", self.xlim), ("ylim", self.ylim)):
-            if limits is not None:
-                _check_limits(name, limits)
         if isinstance(self.marks, str):
             raise InputError(f'marks is a list of kinds: marks=["{self.marks}"]')
+
+    @classmethod
+    def of(cls, options: Mapping[str, Any]) -> View:
+        """The view that the options of a verb ask for, those that are not its own left aside."""
+        return cls(**{f.name: options[f.name] for f in fields(cls) if options.get(f.name) is not None})
 
     @property
     def called(self) -> str:
@@ -239,26 +261,38 @@ class View(Units):
 
     @property
     def number(self) -> int | None:
-        """The number of the degree of freedom that was chosen."""
+        """The number of the degree of freedom that was chosen, None for the one that each curve observes."""
         if isinstance(self.dof, str | tuple):
             raise InputError(f"dof={self.dof!r}: curves laid out as datasets have no names of DOFs; give its number")
-        return self.dof
+        return None if isinstance(self.dof, list) else self.dof
+
+    @property
+    def each(self) -> list[View]:
+        """A view of each of several degrees of freedom; itself alone where one is chosen, or none."""
+        if not isinstance(self.dof, list):
+            return [self]
+        if not self.dof:
+            raise InputError("dof=[]: give degrees of freedom, or leave it out for the observed one")
+        return [replace(self, dof=one) for one in self.dof]
 
     def placed(self, curves: Iterable[Any]) -> View:
-        """The view with the number of the degree of freedom in the place of its name, as the system of the first of
-        these curves that has one names it.
+        """The view with numbers of degrees of freedom in the places of their names, as the system of the first of
+        these curves that has one names them.
         """
-        if not isinstance(self.dof, str | tuple):
+        several = self.dof if isinstance(self.dof, list) else [self.dof]
+        if not any(isinstance(one, str | tuple) for one in several):
             return self
         curves = list(curves)
         members = (item for curve in curves for item in (curve, *getattr(curve, "branches", ())))
         systems = (getattr(item, "system", None) for item in members)  # that of a dataset is its name
         system: Any = next((one for one in systems if hasattr(one, "dof_names")), None)
-        if system is not None:
-            return replace(self, dof=chosen_dof(self.dof, 0, system.n, names=system.dof_names))
         laid_out = (dof_names_of(curve) for curve in curves if hasattr(curve, "attrs"))
-        names = next((names for names in laid_out if names), ())
-        return replace(self, dof=chosen_dof(self.dof, 0, len(names), names=names)) if names else self
+        names = next((names for names in laid_out if names), ()) if system is None else system.dof_names
+        if system is None and not names:
+            return self
+        count = len(names) if system is None else system.n
+        numbers: list[GivenDof] = [chosen_dof(one, 0, count, names=names) for one in several]
+        return replace(self, dof=numbers if isinstance(self.dof, list) else numbers[0])
 
     @property
     def multiple(self) -> float:
@@ -362,15 +396,12 @@ class Coordinates:
     def limits(
         self, datasets: Sequence[xarray.Dataset], *margins: float, from_zero: bool = False
     ) -> list[tuple[float, float]]:
-        """The limits of the axes: `xlim` and `ylim` of the view, else all points and events with a margin.
+        """The limits of the axes: all points and events with a margin.
 
         `margins`: shares of each axis beyond what is drawn; `from_zero`: a quantity never negative begins there.
         """
         every = np.concatenate([part for dataset in datasets for part in self.of(dataset)], axis=1)
-        view, limits = self.view, []
-        if view.xlim is not None:
-            inside = (every[0] >= view.xlim[0]) & (every[0] <= view.xlim[1])
-            every = every[:, inside] if inside.any() else every
+        limits = []
         for name, row, margin in zip(self.names, every, margins, strict=True):
             known = row[np.isfinite(row)]
             low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
@@ -379,22 +410,15 @@ class Coordinates:
                 low, high = 0.0, high or 1.0
             beyond = margin * (high - low or abs(low) or 1.0)
             limits.append((low if at_zero else low - beyond, high + beyond))
-        for index, given in enumerate((view.xlim, view.ylim)):
-            if given is not None:
-                limits[index] = (float(given[0]), float(given[1]))
         return limits
 
     def marked(self, dataset: xarray.Dataset) -> np.ndarray:
-        """Which of the events get a marker, (events,), bool: those of the kinds asked for, inside the limits."""
-        kinds, view = dataset["event_kind"].to_numpy(), self.view
-        chosen = np.array([view.marks is None or str(kind) in view.marks for kind in kinds], dtype=bool)
-        for row, limits in zip(self.of(dataset)[1], (view.xlim, view.ylim), strict=False):
-            if limits is not None:
-                chosen &= (row >= limits[0]) & (row <= limits[1])
-        return chosen
+        """Which of the events get a marker, (events,), bool: those of the kinds asked for."""
+        kinds, marks = dataset["event_kind"].to_numpy(), self.view.marks
+        return np.array([marks is None or str(kind) in marks for kind in kinds], dtype=bool)
 
     def labels(self, datasets: Sequence[xarray.Dataset]) -> tuple[str, ...]:
-        """What the axes say; `xlabel` and `ylabel` of the view are those of the first two."""
+        """What the axes say."""
         view, texts = self.view, []
         for index, name in enumerate(self.names):
             text = view.of_omega(datasets) if name == "omega" else view.label(datasets) if name is None else name
@@ -405,8 +429,7 @@ class Coordinates:
             if name is None and unit is None:
                 unit = "°" if view.in_degrees else view.unit_of(view.kind.unit, datasets)
             texts.append(text + (f" ({unit})" if unit else ""))
-        own = (view.xlabel, view.ylabel, None)
-        return tuple(given or text for given, text in zip(own, texts, strict=False))
+        return tuple(texts)
 
 
 @dataclass(frozen=True)
@@ -524,12 +547,3 @@ def shown_multiple(multiple: float) -> str:
 def _check_element(quantity: str, element: Any) -> None:
     if isinstance(element, bool) or not isinstance(element, int | np.integer):
         raise InputError(f"the quantity {quantity!r} is one of an element: give element=, its index")
-
-
-def _check_limits(name: str, limits: Any) -> None:
-    try:
-        first, last = (float(value) for value in limits)
-    except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{name}={limits!r}: give two numbers, (from, to)") from None
-    if not (math.isfinite(first) and math.isfinite(last) and first < last):
-        raise InputError(f"{name}=({first:g}, {last:g}): two finite numbers, the smaller one first")

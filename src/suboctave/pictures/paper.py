@@ -8,6 +8,7 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial, wraps
 from itertools import product
 from pathlib import Path
@@ -30,7 +31,6 @@ from suboctave.pictures.drawing import (
     Frame,
     Guide,
     Item,
-    Label,
     Markers,
     Polyline,
     Raster,
@@ -38,14 +38,15 @@ from suboctave.pictures.drawing import (
     Surface,
     spread,
 )
-from suboctave.pictures.options import PageOptions
+from suboctave.pictures.frames import framed
+from suboctave.pictures.options import FrameOptions
+from suboctave.pictures.placing import annotate, arrange, box_of, crowds, fitting_legend, grow, legend_inside
 from suboctave.pictures.strokes import bent
 from suboctave.session import at_prompt
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.legend import Legend
     from matplotlib.transforms import Bbox
 
 
@@ -61,6 +62,8 @@ _EMBEDDED: dict[Any, Any] = {"pdf.fonttype": 42, "svg.fonttype": "path", "svg.ha
 _WIDE = 5.0
 #: lengths of the edges of the frame in space, one to another
 _ASPECT = (1.5, 1.15, 0.95)
+#: decades of a logarithmic axis up to which its ticks are plain numbers
+_FEW = 4.0
 #: inches of width of a page below which there are fewer ticks, and labels closer to their axes
 _SMALL = 4.2
 
@@ -75,8 +78,19 @@ def figure_of(drawing: Drawing, sheet: style.Sheet) -> Figure:
     return _filled(figure, drawing, sheet)
 
 
-def save_or_show(drawing: Drawing, sheet: style.Sheet, path: str | Path | None) -> Figure:
-    """The figure of a drawing, saved where a path is given; else at a prompt in a window, where there is a screen."""
+def finished(drawing: Drawing, sheet: style.Sheet, path: str | Path | None, options: Mapping[str, Any]) -> Figure:
+    """The figure of a drawing, saved where a path is given; else at a prompt in a window, where there is a screen.
+
+    `options`: those of `FrameOptions`. Into axes that a user gives it is drawn as it is elsewhere; the figure is then
+    that of these axes.
+    """
+    check_path(path)
+    drawing = framed(drawing, options)
+    if (own := options.get("ax")) is not None:
+        figure = _into(own, drawing, sheet)
+        if path is not None:
+            save_figure(figure, path)
+        return figure
     if path is None and at_prompt():
         from matplotlib import get_backend, pyplot
         from matplotlib.backends import BackendFilter, backend_registry
@@ -112,7 +126,7 @@ def drawing_of(figure: Figure) -> Drawing | None:
     return _DRAWINGS.get(figure)
 
 
-class _Page(PageOptions, total=False):
+class _Page(FrameOptions, total=False):
     """Keywords of what draws one frame."""
 
     path: Annotated[str | Path | None, "Where the figure is saved: .png, .svg or .pdf."]
@@ -128,11 +142,11 @@ def picture(size: tuple[float, float], **arranged: Any) -> Callable[[Callable[..
         @with_options(_Page)
         @wraps(layout)
         def drawn(*given: Any, **options: Any) -> Figure:
-            path, title, own = (options.pop(name, None) for name in ("path", "title", "size"))
+            page = {name: options.pop(name, None) for name in _Page.__optional_keys__}
             frame, axes = layout(*given, **options)
-            frame.title = style.checked_text(title)
-            sheet = style.sheet_of(size if own is None else own)
-            return save_or_show(Drawing(axes, [frame], **arranged), sheet, path)
+            frame.title = style.checked_text(page["title"])
+            sheet = style.sheet_of(page["size"] or size)
+            return finished(Drawing(axes, [frame], **arranged), sheet, page["path"], page)
 
         return drawn
 
@@ -148,6 +162,7 @@ def _in_plane(figure: Figure, drawing: Drawing, sheet: style.Sheet) -> None:
         every[index - columns].tick_params(labelbottom=True)
     frames, (across, upwards) = every[:count], drawing.axes
     for index, (axes, frame) in enumerate(zip(frames, drawing.frames, strict=True)):
+        _set_scales(axes, drawing)
         draw(axes, frame, look)
         labels = across.label if index + columns >= count else "", upwards.label if index % columns == 0 else ""
         dress(axes, labels, look, grid=drawing.grid)
@@ -159,19 +174,100 @@ def _in_plane(figure: Figure, drawing: Drawing, sheet: style.Sheet) -> None:
         figure.suptitle(drawing.title, fontsize=look.large, color=style.INK)
     _place(figure, frames, drawing, sheet)  # the frames have their places: what is spaced on paper comes now
     for axes, frame in zip(frames, drawing.frames, strict=True):
-        box = axes.get_window_extent()
-        size = box.width / figure.dpi * 25.4, box.height / figure.dpi * 25.4
-        low, high = np.array([axes.get_xlim(), axes.get_ylim()]).T
-        for item in frame.items:
-            if isinstance(item, Beads) and (at := item.places(low, high, size)).size:
-                _draw(axes, Markers(at, item.mark, role=item.role, layer=item.layer + 0.5), look, (1.0, 1.0))
-        annotate(axes, frame.labels, look)
+        _draw_spaced(axes, frame, look)
+
+
+def _draw_spaced(axes: Axes, frame: Frame, look: style.Look) -> None:
+    """Draw what is spaced on paper, in a frame that has its place: marks along lines, and labels."""
+    figure: Any = axes.figure
+    box = axes.get_window_extent()
+    size = box.width / figure.dpi * 25.4, box.height / figure.dpi * 25.4
+    low, high = _flat(axes, np.array([axes.get_xlim(), axes.get_ylim()])).T
+    for item in frame.items:
+        if isinstance(item, Beads):
+            along = replace(item, at=_flat(axes, item.at), clear=_flat(axes, item.clear))
+            if (at := along.places(low, high, size)).size:
+                beads = Markers(_flat(axes, at, back=True), item.mark, role=item.role, layer=item.layer + 0.5)
+                _draw(axes, beads, look, (1.0, 1.0))
+    annotate(axes, [*frame.labels, *crowds(axes, frame)], look)
+
+
+def _into(given: Any, drawing: Drawing, sheet: style.Sheet) -> Figure:
+    """Draw into axes of a user; the figure that they belong to.
+
+    What they say already stays, and so does their look; their limits widen to what is drawn.
+    """
+    from matplotlib.axes import Axes
+
+    several: list[Any] = list(np.ravel(np.asarray(given, dtype=object)))
+    if not all(isinstance(axes, Axes) for axes in several):
+        raise InputError(f"ax takes axes of Matplotlib, such as plt.gca(), not {type(given).__name__}")
+    if len(several) != len(drawing.frames):
+        raise InputError(f"ax has {len(several)} axes, the figure {len(drawing.frames)}: give as many")
+    solid = len(drawing.axes) == 3
+    if any((axes.name == "3d") is not solid for axes in several):
+        asked = 'axes in space, figure.add_subplot(projection="3d")' if solid else "axes in the plane"
+        raise InputError(f"ax: what is drawn needs {asked}")
+    look, entries = sheet.look, handles(drawing.entries, sheet.look)
+    for axes, frame in zip(several, drawing.frames, strict=True):
+        letters = "xyz"[: len(drawing.axes)]
+        before = {letter: getattr(axes, f"get_{letter}lim")() for letter in letters} if axes.has_data() else {}
+        if not solid:
+            _set_scales(axes, drawing)
+        draw(axes, frame, look)
+        for letter, axis in zip(letters, drawing.axes, strict=True):
+            if not getattr(axes, f"get_{letter}label")():
+                getattr(axes, f"set_{letter}label")(axis.label)
+            ends = [(axis.low, axis.high), before.get(letter, (None, None))]
+            low, high = ([end for end in side if end is not None] for side in zip(*ends, strict=True))
+            getattr(axes, f"set_{letter}lim")(min(low, default=None), max(high, default=None))
+        if title := frame.title or drawing.title:
+            axes.set_title(title)
+        if axes is several[0] and entries:
+            _extend_legend(axes, entries, sheet)
+    figure: Figure = several[0].figure.figure  # of a part of a figure the whole
+    arrange(figure)
+    for axes, frame in zip(several, drawing.frames, strict=True) if not solid else ():
+        _draw_spaced(axes, frame, look)
+    return figure
+
+
+def _extend_legend(axes: Any, entries: Mapping[str, Any], sheet: style.Sheet) -> None:
+    """Add entries to the legend of axes, under what it has."""
+    old = axes.get_legend()
+    known = (
+        {} if old is None else dict(zip((text.get_text() for text in old.get_texts()), old.legend_handles, strict=True))
+    )
+    every = {**known, **entries}
+    if not legend_inside(axes, every, sheet):
+        axes.legend(list(every.values()), list(every), loc="best", **box_of(sheet))
+
+
+def _set_scales(axes: Axes, drawing: Drawing) -> None:
+    """Logarithmic axes, before anything is drawn: lines are smooth as they are seen."""
+    for letter, axis in zip("xy", drawing.axes, strict=True):
+        if axis.logarithmic:
+            getattr(axes, f"set_{letter}scale")("log")
+
+
+def _flat(axes: Any, at: np.ndarray, *, back: bool = False) -> np.ndarray:
+    """Places, (axes, places), in coordinates that are linear on the page; or back."""
+    if len(at) > 2:
+        return at
+    scales = [getattr(axes, f"get_{letter}scale")() for letter in "xy"]
+    if "log" not in scales:
+        return at
+    with np.errstate(divide="ignore", invalid="ignore"):
+        rows = [
+            (10.0**row if back else np.log10(row)) if s == "log" else row for row, s in zip(at, scales, strict=True)
+        ]
+    return np.array(rows)
 
 
 def _place(figure: Figure, frames: Sequence[Axes], drawing: Drawing, sheet: style.Sheet) -> None:
     entries, where = handles(drawing.entries, sheet.look), drawing.legend
     arrange(figure)  # a legend inside one of the frames moves nothing
-    if where == "free" and any(_legend_inside(axes, entries, sheet) for axes in frames):
+    if where == "free" and any(legend_inside(axes, entries, sheet) for axes in frames):
         return
     if where in ("beside", "below"):
         beside = where == "beside" and sheet.inches[0] >= _WIDE
@@ -180,7 +276,7 @@ def _place(figure: Figure, frames: Sequence[Axes], drawing: Drawing, sheet: styl
         fitting_legend(figure, entries, sheet, most=1 if beside else 2, loc=place, **plain)
     elif entries:
         if sheet.named:
-            _grow(figure, entries, sheet)
+            grow(figure, entries, sheet)
         fitting_legend(figure, entries, sheet, loc="outside upper center")
 
 
@@ -188,7 +284,7 @@ def _place(figure: Figure, frames: Sequence[Axes], drawing: Drawing, sheet: styl
 def draw(axes: Any, frame: Frame, look: style.Look) -> None:
     """Draw what stands in a frame, but for what is spaced on paper and for labels."""
     seen = [item.at for item in frame.items if isinstance(item, Polyline | Markers)]
-    around = spread(np.concatenate(seen, axis=1)) if seen else (1.0, 1.0)
+    around = spread(_flat(axes, np.concatenate(seen, axis=1))) if seen else (1.0, 1.0)
     for item in frame.items:
         _draw(axes, item, look, around)
 
@@ -197,7 +293,10 @@ def _draw(axes: Any, item: Item, look: style.Look, around: tuple[float, float]) 
     placed: dict[str, Any] = {"zorder": item.layer, "gid": item.role}
     match item:
         case Polyline():
-            at = bent(item.at[0], item.at[1], around) if item.smooth else item.at
+            at = item.at
+            if item.smooth:
+                across, upwards = _flat(axes, item.at)
+                at = _flat(axes, np.array(bent(across, upwards, around)), back=True)
             axes.plot(*at, **_line(item.pen, look), **placed)
         case Markers():
             axes.plot(*item.at, clip_on=item.cut, linestyle="none", **_marker(item.mark, look), **placed)
@@ -281,6 +380,7 @@ def dress(axes: Axes, labels: tuple[str, str], look: style.Look, *, grid: bool =
     axes.set_ylabel(labels[1], fontsize=look.large, color=style.INK)
     axes.tick_params(direction="in", top=True, right=True, labelsize=look.normal, color=style.INK, zorder=2)
     axes.tick_params(which="minor", direction="in", top=True, right=True, color=style.INK, zorder=2)
+    axes.tick_params(axis="x", pad=0.55 * look.normal)  # in the corner clear of the lowest number beside it
     if grid:
         axes.grid(True, color=style.GRID, linewidth=0.4 * look.line, zorder=0)
     axes.set_axisbelow(True)
@@ -290,15 +390,15 @@ def dress(axes: Axes, labels: tuple[str, str], look: style.Look, *, grid: bool =
 
 
 def _set_axis(letter: str, axes: Any, axis: Axis) -> None:
-    """Scale, limits and ticks of one axis, which all frames share."""
+    """Limits and ticks of one axis, which all frames share."""
     from matplotlib.ticker import FixedFormatter, FixedLocator, MaxNLocator, MultipleLocator
 
-    if axis.logarithmic:
-        getattr(axes, f"set_{letter}scale")("log")
     if axis.low is not None or axis.high is not None:
         getattr(axes, f"set_{letter}lim")(axis.low, axis.high)
     own, ticks = getattr(axes, f"{letter}axis"), axis.ticks
     if ticks is None:
+        if axis.logarithmic:
+            _set_decades(own)
         return
     if len(ticks.places):
         own.set_major_locator(FixedLocator(list(ticks.places)))
@@ -307,6 +407,21 @@ def _set_axis(letter: str, axes: Any, axis: Axis) -> None:
     own.set_major_locator(MaxNLocator(nbins=ticks.most, steps=list(ticks.steps), integer=ticks.whole))
     if ticks.minor is not None:
         own.set_minor_locator(MultipleLocator(ticks.minor))
+
+
+def _set_decades(axis: Any) -> None:
+    """Ticks of a logarithmic axis: plain numbers where there are few decades, the ones between them too."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+
+    low, high = sorted(axis.get_view_interval())
+    decades = math.log10(high / low)
+    if decades > _FEW or not 1e-3 <= low < high < 1e5:
+        return
+    within = MaxNLocator(nbins=7, steps=[1, 2, 2.5, 5, 10])  # a part of a decade
+    steps = (1.0,) if decades > 2.0 else (1.0, 2.0, 5.0)
+    axis.set_major_locator(LogLocator(subs=steps) if decades > 0.9 else within)
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 # ------------------------------------------------------------------------------------------------------------- in space
@@ -337,7 +452,7 @@ def _fill_page(figure: Figure, axes: Any, drawing: Drawing, sheet: style.Sheet) 
     """Title and legend above, and the frame as large as what is left; a named size grows by the legend's height."""
     entries, look = handles(drawing.entries, sheet.look), sheet.look
     if sheet.named:
-        _grow(figure, entries, sheet)
+        grow(figure, entries, sheet)
     top, whole = 1.0, figure.bbox.height
     if drawing.title:
         figure.suptitle(drawing.title, fontsize=look.large, color=style.INK, y=0.985)
@@ -406,127 +521,3 @@ def image_of(figure: Figure, form: str, **options: Any) -> bytes:
     with matplotlib.rc_context(_EMBEDDED):
         figure.savefig(buffer, format=form, metadata=_METADATA[f".{form}"], **options)
     return buffer.getvalue()
-
-
-# --------------------------------------------------------------------------------------------------- legends and labels
-#: where a legend is tried inside a frame
-_PLACES: tuple[Any, ...] = ("upper left", "upper right", "center left", "center right", "lower left", "lower right")
-#: share of a frame's height from which a legend stands above it
-_TALL = 0.7
-#: so that two columns fit into the width of a journal's column
-_TIGHT: dict[str, Any] = {"handlelength": 2.0, "handletextpad": 0.5, "columnspacing": 1.0}
-#: distances of a text from its point, nearest first; further away where everything near is taken
-_DISTANCES = (1.0, 2.4, 3.8)
-#: points kept clear between two texts, and, rather, between a text and the frame with its ticks
-_CLEAR, _TICKS = 1.5, 4.0
-_SIDES = ((1, 0), (-1, 0), (1, 1), (-1, 1), (1, -1), (-1, -1), (0, 1), (0, -1))
-
-
-def arrange(figure: Figure) -> None:
-    """Give everything on a figure its place, as drawing it would."""
-    engine = figure.get_layout_engine()
-    if engine is None:
-        figure.draw_without_rendering()
-    else:
-        engine.execute(figure)
-
-
-def fitting_legend(
-    figure: Figure, entries: Mapping[str, Any], sheet: style.Sheet, *, most: int = 4, **where: Any
-) -> Legend:
-    """The legend of a figure in as many columns as the page is wide, `most` at most; `where` as Matplotlib takes it."""
-    for columns in range(max(1, min(len(entries), most)), 0, -1):
-        legend = figure.legend(list(entries.values()), list(entries), ncols=columns, **_frame_of(sheet) | where)
-        arrange(figure)
-        if columns == 1 or legend.get_window_extent().width <= figure.bbox.width:
-            break
-        legend.remove()
-    return legend
-
-
-def _grow(figure: Figure, entries: Mapping[str, Any], sheet: style.Sheet) -> None:
-    """Add the height of the legend to that of the figure: a named size is a width."""
-    width, height = figure.get_size_inches()
-    legend = fitting_legend(figure, entries, sheet)
-    figure.set_size_inches(width, height + legend.get_window_extent().height / figure.dpi)
-    legend.remove()
-
-
-def _legend_inside(axes: Axes, entries: Mapping[str, Any], sheet: style.Sheet) -> bool:
-    """Whether there is a place for the legend inside a frame where it covers nothing; it stands there then."""
-    if not entries:
-        return True
-    legend, frame = axes.legend(list(entries.values()), list(entries), **_frame_of(sheet)), axes.get_window_extent()
-    legend.set_zorder(6)
-    for place in _PLACES:
-        legend.set_loc(place)
-        box = legend.get_window_extent()
-        inside = frame.x0 <= box.x0 and box.x1 <= frame.x1 and box.height < _TALL * frame.height
-        if inside and not _covered(axes, box.padded(axes.figure.dpi / 72.0 * style.MARKER_SIZE)):
-            return True
-    legend.remove()
-    return False
-
-
-def _frame_of(sheet: style.Sheet) -> dict[str, Any]:
-    frame = {"frameon": True, "framealpha": 1.0, "edgecolor": style.GRID, "handlelength": 2.6}
-    return {"fontsize": sheet.look.small, **frame, **(_TIGHT if sheet.named else {})}
-
-
-def annotate(axes: Axes, labels: Sequence[Label], look: style.Look) -> None:
-    """Write texts beside their places; the same text at the same place once.
-
-    Of the sides of a place the one is taken on which the text covers the fewest lines, markers and other texts, and is
-    not nearer to the place of another text.
-    """
-    unit, window, legend = axes.figure.dpi / 72.0, axes.get_window_extent(), axes.get_legend()
-    taken = [] if legend is None else [legend.get_window_extent()]
-    gap = 0.75 * style.MARKER_SIZE * look.marker
-    looks: dict[str, Any] = {"fontsize": look.small, "color": style.INK, "zorder": 7, "gid": "label"}
-    done: list[tuple[str, np.ndarray]] = []
-    points = [axes.transData.transform(label.at) for label in labels]
-    for label, point in zip(labels, points, strict=True):
-        others = [there for other, there in zip(labels, points, strict=True) if other.text != label.text]
-        again = any(label.text == text and np.hypot(*(point - there)) < 3.0 * unit for text, there in done)
-        if again or not np.isfinite(point).all():
-            continue
-        done.append((label.text, point))
-        at: dict[str, Any] = {"xy": label.at, "textcoords": "offset points", "annotation_clip": False}
-        costs = {}
-        for distance, (rank, (across, up)) in product(_DISTANCES, enumerate(_SIDES)):
-            reach = distance * gap * (0.75 if across and up else 1.0)
-            sides: dict[str, Any] = {"ha": ("center", "left", "right")[across], "va": ("center", "bottom", "top")[up]}
-            note = axes.annotate(label.text, xytext=(reach * across, reach * up), **at, **sides, **looks)
-            box = note.get_window_extent()
-            overlaps = box.padded(_CLEAR * unit).count_overlaps(taken)
-            cost = 40.0 * _covered(axes, box) + 400.0 * (overlaps + _leaves(box, window))
-            own = _distance(box, point)
-            cost += 200.0 * any(_distance(box, there) < own for there in others)
-            costs[note] = cost + 25.0 * _leaves(box, window.padded(-_TICKS * unit)) + 0.1 * rank + 5.0 * distance
-        best = min(costs, key=lambda note: costs[note])
-        for note in costs:
-            if note is not best:
-                note.remove()
-        taken.append(best.get_window_extent())
-
-
-def _distance(box: Bbox, point: np.ndarray) -> float:
-    """From a point to a box, in pixels; zero inside."""
-    return float(np.hypot(*np.maximum(np.maximum(box.min - point, point - box.max), 0.0)))
-
-
-def _covered(axes: Axes, box: Bbox) -> int:
-    """How many lines cross a box, in pixels, and markers lie in it."""
-    count = 0
-    for item in axes.get_lines():
-        path = item.get_transform().transform_path(item.get_path())
-        if item.get_linestyle() != "None":
-            count += path.intersects_bbox(box, filled=False)
-        else:
-            reach = 0.35 * item.get_markersize() * axes.figure.dpi / 72.0
-            count += box.padded(reach).count_contains(path.vertices)
-    return count
-
-
-def _leaves(box: Bbox, frame: Bbox) -> bool:
-    return not (frame.contains(*box.min) and frame.contains(*box.max))

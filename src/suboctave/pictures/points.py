@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from suboctave.pictures import style
-from suboctave.pictures.boundary import is_boundary, kind_of, plane_of
+from suboctave.pictures.boundary import kind_of, plane_of
+from suboctave.pictures.given import is_boundary
 from suboctave.pictures.strokes import number_of
 from suboctave.pictures.style import period_of
 from suboctave.store.layout import coordinate

@@ -24,18 +24,10 @@ from suboctave.arguments import checked
 from suboctave.atomic import free_place, replace_file
 from suboctave.errors import InputError, shortened
 from suboctave.pictures import style
-from suboctave.pictures.boundary import (
-    boundary_drawing,
-    boundary_names,
-    is_boundary,
-    is_isolas,
-    kind_of,
-    parameter_of,
-    plane_of,
-    space_drawing,
-)
+from suboctave.pictures.boundary import boundary_drawing, boundary_names, kind_of, parameter_of, plane_of, space_drawing
 from suboctave.pictures.browser import figure_data
 from suboctave.pictures.drawing import Drawing, Polyline
+from suboctave.pictures.given import is_boundary, is_isolas
 from suboctave.pictures.paper import drawing_of, figure_of, image_of
 from suboctave.pictures.points import Verified, curve_data, verified_by
 from suboctave.pictures.response import response_drawing

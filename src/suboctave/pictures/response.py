@@ -15,18 +15,11 @@ import numpy as np
 from suboctave.errors import InputError
 from suboctave.options import with_options
 from suboctave.pictures import style
-from suboctave.pictures.boundary import (
-    boundary_names,
-    boundary_styles,
-    datasets_of,
-    is_boundary,
-    is_isolas,
-    plot_boundaries,
-    several_of,
-)
+from suboctave.pictures.boundary import boundary_names, boundary_styles, plot_boundaries
 from suboctave.pictures.drawing import Axis, Drawing, Entry, Frame, Markers, Ticks, plain, spread
-from suboctave.pictures.options import Coordinates, CurveOptions, View, symbol_of_dof
-from suboctave.pictures.paper import draw, dress, handles, save_or_show
+from suboctave.pictures.given import datasets_of, is_boundary, is_isolas, named_within, several_of
+from suboctave.pictures.options import Coordinates, CurveOptions, FrameOptions, View, symbol_of_dof
+from suboctave.pictures.paper import draw, dress, finished, handles
 from suboctave.pictures.strokes import (
     OPEN,
     Verdict,
@@ -51,37 +44,37 @@ if TYPE_CHECKING:
 _MARGINS = (0.02, 0.06)
 
 
+@with_options(FrameOptions)
 def plot_response(
-    curves: xarray.Dataset | Sequence[xarray.Dataset],
+    curves: Any,
     path: str | Path | None = None,
     *,
     x: str | None = None,
     labels: Sequence[str] | None = None,
-    title: str | None = None,
-    size: str | tuple[float, float] = (6.4, 4.2),
     view: View | None = None,
+    **options: Unpack[FrameOptions],
 ) -> Figure:
     """One or several response curves in one frame, saved to `path` where one is given (.png, .svg, .pdf).
 
     `x` names the horizontal axis: "omega" or a parameter (default: what the curves were followed in). `labels` tell
-    several curves apart (default: the parameters in which they differ). `size`: "single-column", "double-column", or
-    width and height in inches. `view`: the quantity drawn and the units (default: amplitude, as it is).
+    several curves apart (default: the parameters in which they differ). `view`: the quantity drawn and the units
+    (default: amplitude, as it is).
     """
-    named = None if labels is None else [labels]
-    return plot_panels(
-        [_as_list(curves)], path, x=x, labels=named, titles=[title] if title else None, size=size, view=view
-    )
+    drawing = response_drawing([_as_list(curves)], x=x, labels=None if labels is None else [labels], view=view)
+    drawing.frames[0].title = plain(options.get("title") or "")
+    return finished(drawing, style.sheet_of(options.get("size") or (6.4, 4.2)), path, options)
 
 
+@with_options(FrameOptions)
 def plot_panels(
-    panels: Sequence[xarray.Dataset | Sequence[xarray.Dataset]],
+    panels: Any,
     path: str | Path | None = None,
     *,
     x: str | None = None,
     labels: Sequence[Sequence[str]] | None = None,
     titles: Sequence[str] | None = None,
-    size: str | tuple[float, float] | None = None,
     view: View | None = None,
+    **options: Unpack[FrameOptions],
 ) -> Figure:
     """Several frames side by side on the same axes, with one legend for all of them.
 
@@ -92,11 +85,12 @@ def plot_panels(
     for name, given in (("labels", labels), ("titles", titles)):
         check_count(name, given, len(groups), "panels")
     wide = 6.4 if len(groups) == 1 else 1.0 + 4.2 * len(groups)
-    sheet = style.sheet_of((wide, 4.2) if size is None else size, len(groups))
+    sheet = style.sheet_of(options.get("size") or (wide, 4.2), len(groups))
     drawing = response_drawing(groups, x=x, labels=labels, view=view)
+    drawing.title = plain(options.get("title") or "")
     for frame, title in zip(drawing.frames, titles or (), strict=False):
         frame.title = plain(title)
-    return save_or_show(drawing, sheet, path)
+    return finished(drawing, sheet, path, options)
 
 
 def response_drawing(
@@ -171,7 +165,7 @@ def response_frame(
     frame = Frame()
     for index in order:
         dataset, pen = group[index], pens[index]
-        if labels is not None or several or periods:
+        if labels is not None or several or periods or "called" in dataset.attrs:
             frame.entries[names[index]] = Entry(Pen(pen.colour, 1.3 * pen.width))
         curve = titles[index] if several else ""
         words = {**_ROLES, None: "motions"}
@@ -216,12 +210,11 @@ def _names_and_pens(
 ) -> tuple[list[str], list[Pen]]:
     """Of response curves what tells them apart, and pens by period or in turn; of tracked curves their kinds'."""
     bounds, others = ([data for data in group if is_boundary(data) is kind] for kind in (True, False))
-    names = list(labels or ())
+    names = [plain(label) for label in labels or ()]
     if labels is None:
         alone = ["response"] if bounds and len(others) == 1 else _tell_apart(others, by_period)
         own = {True: iter(boundary_names(bounds)), False: iter(alone)}
         names = [next(own[is_boundary(data)]) for data in group]
-    names = [plain(name) for name in names]
     known = {
         kind: [name for name, data in zip(names, group, strict=True) if is_boundary(data) is kind]
         for kind in (True, False)
@@ -236,8 +229,11 @@ def _names_and_pens(
 def _tell_apart(datasets: Sequence[xarray.Dataset], by_period: bool = False) -> list[str]:
     """Names such as "j = 0" from the parameters that are constant on each curve and differ between curves.
 
-    Where periods are shown they come first: "2T", "2T, j = 0"; so does what a curve shows, where that differs.
+    Where periods are shown they come first: "2T", "2T, j = 0"; so does what a curve shows, where that differs. Names
+    that the user gave stand for all of this, but among curves of one name.
     """
+    if any("called" in dataset.attrs for dataset in datasets):
+        return named_within(datasets, lambda group: _tell_apart(group, by_period))
     words = differing([fixed_parameters(dataset) for dataset in datasets])
     shown = [str(dataset.attrs.get("shows", "response")) for dataset in datasets]
     if len(set(shown)) > 1:
@@ -261,8 +257,6 @@ def plot(
     x: str | None = None,
     y: str | None = None,
     labels: Sequence[str] | None = None,
-    title: str | None = None,
-    size: str | tuple[float, float] = (6.4, 4.2),
     **options: Unpack[CurveOptions],
 ) -> Figure:
     """Draw one or several branches: stable parts solid, unstable ones dashed, bifurcations marked.
@@ -274,7 +268,8 @@ def plot(
     ----------
     curves
         A branch, a dataset of one (`to_xarray`, or a file opened by xarray), a bifurcation diagram (all its branches),
-        isolas (their curves and regions, over frequency and parameter), a sequence of these, or the results of a study.
+        isolas (their curves and regions, over frequency and parameter), the results of a study, a sequence of these, or
+        a dictionary of them by what the legend calls them.
     path
         Where the figure is saved: .png, .svg or .pdf, fonts embedded.
     x
@@ -282,22 +277,23 @@ def plot(
     y
         Of curves of bifurcations (`track`), which are drawn over the plane of their two parameters: the vertical axis.
         A `quantity` that is given takes its place.
-    labels, title
-        Names of the curves in the legend, title.
-    size
-        "single-column" (84 mm), "double-column" (174 mm), or width and height in inches.
+    labels
+        Names of the curves in the legend.
     """
     given = several_of(curves)
+    if isinstance(curves, dict) and labels is not None:
+        raise InputError("the names of the dictionary are the labels: leave labels= out")
     if len(given) == 1:  # a diagram says how it is drawn
         labels = getattr(given[0], "legend", None) if labels is None else labels
         if options.get("marks") is None:
             options["marks"] = getattr(given[0], "marks", None)
-    view = View(**dict[str, Any](options)).placed(given)
+    view = View.of(options).placed(given)
     datasets = datasets_of(curves, view)
     if any(is_isolas(dataset) for dataset in datasets):  # in the plane, without the closed branches
         datasets = [dataset for dataset in datasets if "isola" not in dataset.attrs]
     tracked = [is_boundary(dataset) or is_isolas(dataset) for dataset in datasets]
-    texts: dict[str, Any] = {"labels": labels, "title": title, "size": size, "view": view}
+    frame: dict[str, Any] = {name: own for name, own in options.items() if name in FrameOptions.__optional_keys__}
+    texts: dict[str, Any] = {"labels": labels, "view": view, **frame}
     if tracked and all(tracked):
         projected = options.get("quantity") is not None or options.get("harmonic") is not None
         return plot_boundaries(datasets, path, x=x, y=y, projected=projected, **texts)

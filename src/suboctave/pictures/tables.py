@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from suboctave.pictures import style
-from suboctave.pictures.boundary import is_boundary, kind_of, parameter_of, plane_of
+from suboctave.pictures.boundary import kind_of, parameter_of, plane_of
+from suboctave.pictures.given import is_boundary
 from suboctave.pictures.options import dof_names_of
 from suboctave.pictures.strokes import fixed_parameters, number_of, spelt
 from suboctave.pictures.style import period_name, period_of

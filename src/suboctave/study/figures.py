@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
@@ -19,8 +20,9 @@ from suboctave.maps.isolas.result import Isolas
 from suboctave.model.inputs import check_element
 from suboctave.model.system import System
 from suboctave.pictures import View, plot_boundaries, plot_history, plot_phase, plot_response, plot_space, plot_spectrum
-from suboctave.pictures.boundary import datasets_of
-from suboctave.pictures.options import DERIVATIVES, MotionView, as_multiple
+from suboctave.pictures.frames import check_frame
+from suboctave.pictures.given import datasets_of
+from suboctave.pictures.options import DERIVATIVES, FrameOptions, MotionView, as_multiple
 from suboctave.pictures.style import checked_text, size_in_inches
 from suboctave.results.branch import Branch
 from suboctave.results.diagram import BifurcationDiagram
@@ -31,6 +33,8 @@ from suboctave.study.results import Result
 from suboctave.study.steps.base import CheckContext, Complaint, Motion, Step, tried
 
 _VIEW = [field.name for field in fields(View)]
+#: what a study file says of the frame of a figure in a plane
+_FRAME = sorted(FrameOptions.__optional_keys__ - {"ax"})
 _Limits = Annotated[list[float], Field(min_length=2, max_length=2)]
 
 
@@ -68,7 +72,7 @@ class Figure(Section):
 
     kind: str = "response"
     file: str
-    dof: int | str | None = None
+    dof: Any = None
     frequency: str | None = None
     omega_reference: float | None = None
     scale: float | None = None
@@ -88,7 +92,8 @@ class Figure(Section):
         """What is wrong with it, before any work."""
         if study.system is not None:
             system = study.system
-            yield from tried("dof", lambda: chosen_dof(self.dof, 0, system.n, names=system.dof_names))
+            for dof in self.dof if isinstance(self.dof, list) else [self.dof]:
+                yield from tried("dof", partial(chosen_dof, dof, 0, system.n, names=system.dof_names))
 
     def draw(self, results: Mapping[str, Result], path: Path) -> bool:
         """Draw it; False where what it shows is not there.
@@ -98,12 +103,26 @@ class Figure(Section):
         raise TypeError(f"{type(self).__name__} does not say how it is drawn")
 
 
+class _InPlane(Figure):
+    """A figure in a plane: what of its axes is shown, and their scales."""
+
+    xlim: _Limits | None = None
+    ylim: _Limits | None = None
+    xscale: str | None = None
+    yscale: str | None = None
+
+    def check(self, study: StudyCurves) -> Iterator[Complaint]:
+        yield from tried("", lambda: check_frame({name: getattr(self, name) for name in _FRAME}))
+        yield from super().check(study)
+
+
 class CurveFigure(Figure):
     """One figure of curves; what is drawn follows the keys of `View`."""
 
     analyses: list[str] = Field(default_factory=list)
     x: str | None = None
     size: _Size | None = (6.4, 4.2)
+    dof: int | str | list[int | str] | None = None
     quantity: str = ""
     harmonic: _Multiple | None = None
     element: int | None = None
@@ -194,7 +213,8 @@ class CurveFigure(Figure):
 
     def options(self, labels: Sequence[str] | None, view: View) -> dict[str, Any]:
         """What `plot` takes besides the datasets."""
-        return {"x": self.x, "labels": labels, "title": self.title, "size": self.size, "view": view}
+        frame = {name: getattr(self, name, None) for name in _FRAME}
+        return {"x": self.x, "labels": labels, "view": view, **frame}
 
 
 _CURVES = (Branch, BifurcationDiagram, Isolas)
@@ -214,12 +234,10 @@ def _branches_of(item: Result) -> list[Branch]:
     return [item] if isinstance(item, Branch) and len(item) else []
 
 
-class PlaneFigure(CurveFigure):
-    """Curves in a plane: their names, what of the axes is shown, and the kinds of events that are marked."""
+class PlaneFigure(_InPlane, CurveFigure):
+    """Curves in a plane: their names, and the kinds of events that are marked."""
 
     labels: list[_Text] | None = None
-    xlim: _Limits | None = None
-    ylim: _Limits | None = None
     marks: list[str] | None = None
 
 
@@ -334,12 +352,13 @@ def _closed(datasets: Mapping[str, Any], values: Sequence[float] | None) -> list
 
 
 # ------------------------------------------------------------------------------------------------------------ motions
-class MotionFigure(Figure):
+class MotionFigure(_InPlane, Figure):
     """One figure of motions, each chosen as `start` chooses one."""
 
     quantities: ClassVar[Sequence[str]] = ("displacement",)
 
     motions: list[Motion] = Field(min_length=1)
+    dof: int | str | None = None
     overlay: bool = False
     labels: list[_Text] | None = None
 

@@ -473,7 +473,7 @@ class IsolaMap(PlaneMap):
     def plot(self, path: str | Path | None = None, **options: Any) -> Any:
         """The regions in the plane of both parameters, curves of birth and merging named.
 
-        Options: `title`, `size`, `xlim`, `ylim`, `xlabel`, `ylabel`.
+        Options are those of every figure in a plane, such as `title` and `xlim`.
         """
         from suboctave.pictures.maps import plot_isola_map
 
