@@ -164,7 +164,7 @@ WRONG = {
     ),
     "bytes": (
         lambda s, b: so.CubicSpring(b"no", 1.0),
-        "CubicSpring: dof must be an integer or a pair of integers, not ...",
+        "CubicSpring: dof must be an integer, a name, or a pair of these, not ...",
     ),
     "ragged": (
         lambda s, b: so.Structure([[1.0], [1.0, 2.0]], np.eye(2)),

@@ -73,7 +73,7 @@ def test_other_tables_have_both_columns():
     system = so.System(
         1.0, 0.2, 1.0, [so.CubicSpring(0, 1.0)], [so.HarmonicLoad(0, "period")], parameters={"period": 0.3}
     )
-    diagram = so.brute_force_diagram(system, 1.2, parameter="period", bounds=[0.1, 0.2, 0.3], transient=50)
+    diagram = so.brute_force_diagram(system, 1.2, parameter="period", bounds=(0.1, 0.3), values=3, transient=50)
     frame = diagram.to_dataframe()
     assert sorted(set(frame["parameter.period"])) == pytest.approx([0.1, 0.2, 0.3])
     assert set(frame["period"]) == {1}

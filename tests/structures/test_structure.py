@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-
 import numpy as np
 import pytest
 import scipy.linalg
@@ -567,12 +565,30 @@ def test_observed_by_name():
         so.frequency_response(system, (100.0, 101.0), harmonics=3, observe="2 zz")
 
 
-@pytest.mark.parametrize(
-    ("dof", "number"), [(("node 1042", "z"), "structure.dof('node 1042', 'z')"), ("a", "structure.dof('a')")]
-)
-def test_a_place_by_its_label_is_refused_with_what_to_write(dof, number):
-    with pytest.raises(InputError, match=re.escape(f"has the number {number}")):
-        so.ElasticStop(dof, 1.0, 0.1)
+@pytest.mark.parametrize("dof", ["2 z", "node 2 Z", ("2", "z"), (2, "z")])
+def test_elements_and_loads_take_names(dof):
+    """The system has the numbers; one alone knows none."""
+    structure = beam(4)
+    number = structure.dof("2 z")
+    stop = so.ElasticStop(dof, 1.0, 0.1)
+    system = structure.system([stop], [so.HarmonicLoad(dof, 0.3)], damping=so.Rayleigh(3.0, 0.0))
+    assert system.elements[0].place.dofs == system.loads[0].place.dofs == (number,)
+    assert "dof=" in repr(stop)
+    with pytest.raises(InputError, match="is a name, which a System with dof_names has"):
+        stop.direction(3)
+    with pytest.raises(InputError, match="they have no names"):
+        so.System(1.0, 0.1, 1.0, [stop])
+
+
+def test_two_names_are_a_difference():
+    parts = np.eye(2), 0.1 * np.eye(2), np.eye(2)
+    names = ["left", "right"]
+    system = so.System(*parts, [so.CubicSpring(("left", "right"), 1.0)], dof_names=names)
+    np.testing.assert_array_equal(system.elements[0].direction(2), [1.0, -1.0])
+    law = so.Expression("left", "u*w", inputs={"u": "left", "w": ("right", "left")})
+    np.testing.assert_array_equal(so.System(*parts, [law], dof_names=names).elements[0].inputs(2), [[1, 0], [-1, 1]])
+    with pytest.raises(InputError, match=r"CubicSpring: dof='lefft' is none .*did you mean 'left'"):
+        so.System(*parts, [so.CubicSpring("lefft", 1.0)], dof_names=names)
 
 
 @pytest.mark.parametrize("damping", [so.ModalDamping(0.02), so.ModalDamping(0.02, 2), so.Rayleigh(0.1, "b")])

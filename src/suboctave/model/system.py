@@ -19,7 +19,7 @@ from suboctave.arguments import Rule, Title, checked
 from suboctave.errors import InputError, Key, Refusals, is_number, located, printable, shortened, suggest
 from suboctave.model.angles import Angle, Turns, check_angles, numbered, read_angles
 from suboctave.model.description import Arrays, build_part, describe_part, from_plain, plain_value
-from suboctave.model.elements.base import Array, BaseElement
+from suboctave.model.elements.base import Array, BaseElement, with_numbers
 from suboctave.model.elements.smoothness import CornerSampling, PiecewiseLinear, SharpVelocitySampling
 from suboctave.model.expressions.coefficients import Coefficient
 from suboctave.model.expressions.reader import RESERVED
@@ -48,10 +48,11 @@ class System:
     `loads`: a sequence of `HarmonicLoad` and other loads, on the right-hand side. `parameters`: `{name: number}`, every
     one of them used somewhere.
     `structural`: structural damping S, a force `i S x` at every frequency: like the other matrices, `{"eta": K}` for a
-    loss factor. `dof_names`: names for messages. Units are the user's own, if they are consistent; frequencies are
-    circular. `units`: their names, length, force (or mass) and time, such as `"mm, N, s"`, for axes and tables; nothing
-    is converted. `angles`: degrees of freedom that mean the same position a whole turn further, by number or name,
-    those that only turn together as a list; a mapping says the size of a turn, `{"x": "pi"}`, default 2 pi.
+    loss factor. `dof_names`: by these elements and loads may say where they act, `dof="x"`. Units are the user's own,
+    if they are consistent; frequencies are circular. `units`: their names, length, force (or mass) and time, such as
+    `"mm, N, s"`, for axes and tables; nothing is converted. `angles`: degrees of freedom that mean the same position a
+    whole turn further, by number or name, those that only turn together as a list; a mapping says the size of a turn,
+    `{"x": "pi"}`, default 2 pi.
 
     Raises `InputError` for anything that does not fit, before any work.
     """
@@ -97,8 +98,8 @@ class System:
             structural=read.zeros("structural")
             if structural is None
             else matrix_coefficient(structural, read.n, "structural"),
-            elements=sorted(_several(elements, BaseElement, "Element", "elements"), key=lambda e: e.own_nodes),
-            loads=_several(loads, Load, "HarmonicLoad", "loads"),
+            elements=sorted(_several(elements, BaseElement, "Element", "elements", names), key=lambda e: e.own_nodes),
+            loads=_several(loads, Load, "HarmonicLoad", "loads", names),
             parameters=_read_parameters(parameters),
             name=printable(str(name)),
             dof_names=names,
@@ -460,15 +461,18 @@ def _assemble(check: bool = False, **parts: Any) -> System:
     return result
 
 
-def _several(items: Any, kind: type, name: str, what: str) -> tuple[Any, ...]:
-    if isinstance(items, kind):
-        return (items,)
+def _several(items: Any, kind: type, name: str, what: str, names: tuple[str, ...]) -> tuple[Any, ...]:
+    items = (items,) if isinstance(items, kind) else items
     if not isinstance(items, Iterable):
         raise InputError(f"{what} must be a sequence of {name}, not {items!r}")
     for item in (listed := tuple(items)):
         if not isinstance(item, kind):
             raise InputError(f"{what} must hold objects of the kind {name}, not {item!r}")
-    return listed
+    placed = []
+    for i, item in enumerate(listed):
+        with located(what, i, owner=type(item).__name__):
+            placed.append(with_numbers(item, names))
+    return tuple(placed)
 
 
 def _read_dof_names(names: Iterable[str], n: int) -> tuple[str, ...]:

@@ -14,6 +14,7 @@ import functools
 import inspect
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from numbers import Integral
 from typing import Annotated, Any, TypeAlias
 
@@ -21,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from suboctave.arguments import READ
-from suboctave.errors import InputError, located, shortened
+from suboctave.errors import InputError, chosen_dof, located, shortened
 from suboctave.interruption import users_function
 from suboctave.model.description import Recorded
 from suboctave.model.elements.batch_form import BatchForm, CalledBack, form_of_sampling
@@ -29,7 +30,7 @@ from suboctave.model.elements.smoothness import Sampling, WholeLaw, widths_of
 from suboctave.model.expressions.coefficients import Coefficient, Number, named_coefficient
 
 Array: TypeAlias = NDArray[np.float64]
-Dof: TypeAlias = Annotated[int | Sequence[int], READ]
+Dof: TypeAlias = Annotated[int | str | Sequence[int | str], READ]
 
 
 def numbers_of(given: Any) -> Array:
@@ -48,6 +49,8 @@ class Place:
         if (dof is None) == (direction is None):
             raise InputError(f"{owner} needs either dof= (one index, or a pair) or direction= (a vector), not both")
         self.dofs: tuple[int, ...] = ()
+        #: the names that are given, until a system tells their numbers
+        self.named = ""
         self.vector: Array | None = None
         if dof is None:
             self.vector = numbers_of(direction)
@@ -62,11 +65,12 @@ class Place:
         several = isinstance(asked, Sequence | np.ndarray) and not isinstance(asked, str | bytes)
         given = tuple(asked) if several and getattr(asked, "ndim", True) else (asked,)
         with located("dof"):
-            if len(given) not in (1, 2) or any(isinstance(e, bool) or not isinstance(e, Integral) for e in given):
-                named = any(isinstance(entry, str) for entry in given)
-                called = f"structure.dof({', '.join(map(repr, given))})"
-                hint = f"; what a structure calls so has the number {called}" if named else ""
-                raise InputError(f"{owner}: dof must be an integer or a pair of integers, not {shortened(dof)}{hint}")
+            if len(given) not in (1, 2) or any(isinstance(e, bool) or not isinstance(e, Integral | str) for e in given):
+                what = "an integer, a name, or a pair of these"
+                raise InputError(f"{owner}: dof must be {what}, not {shortened(dof)}")
+            if _is_named(given):
+                self.named = shortened(dof)
+                return
             self.dofs = tuple(int(entry) for entry in given)
             if min(self.dofs) < 0:
                 raise InputError(f"{owner}: dof {min(self.dofs)} is negative; degrees of freedom count from 0")
@@ -80,6 +84,8 @@ class Place:
                 text = f"{self.owner}: direction has {len(self.vector)} entries, the structure {n} DOFs"
                 raise InputError(text, ("direction",))
             return self.vector.copy()
+        if self.named:
+            raise InputError(f"{self.owner}: dof={self.named} is a name, which a System with dof_names has", ("dof",))
         if max(self.dofs) >= n:
             there = "only DOF 0" if n == 1 else f"DOFs 0 to {n - 1}"
             raise InputError(f"{self.owner}: dof {max(self.dofs)} does not exist; the structure has {there}", ("dof",))
@@ -92,7 +98,38 @@ class Place:
         if self.vector is not None:
             shown = ", ".join(f"{entry:g}" for entry in self.vector[:4]) + (", ..." if len(self.vector) > 4 else "")
             return f"direction=[{shown}]"
+        if self.named:
+            return f"dof={self.named}"
         return f"dof={self.dofs[0]}" if len(self.dofs) == 1 else f"dof={self.dofs}"
+
+
+def _is_named(given: Any) -> bool:
+    """Whether degrees of freedom are given by names."""
+    if isinstance(given, Mapping):
+        return any(map(_is_named, given.values()))
+    return isinstance(given, str) or (isinstance(given, list | tuple) and any(map(_is_named, given)))
+
+
+def with_numbers(part: Any, names: Sequence[str]) -> Any:
+    """An element or a load with the numbers of its degrees of freedom in the place of their names, if it has any."""
+    given = {name: part.arguments[name] for name in ("dof", "perpendicular", "inputs") if name in part.arguments}
+    asked = {name: value for name, value in given.items() if _is_named(value)}
+    if not asked:
+        return part
+    numbered = {name: _numbered(value, names, name) for name, value in asked.items()}
+    return type(part)(**{**part.arguments, **numbered})
+
+
+def _numbered(given: Any, names: Sequence[str], argument: str) -> Any:
+    if isinstance(given, Mapping):
+        return {key: _numbered(value, names, argument) for key, value in given.items()}
+    if isinstance(given, list | tuple):
+        if len(given) == 2 and argument == "dof":
+            # one of a node, ("1042", "z"), or two
+            with suppress(InputError):
+                return chosen_dof(tuple(given), 0, len(names), argument, names)
+        return [_numbered(entry, names, argument) for entry in given]
+    return chosen_dof(given, 0, len(names), argument, names) if isinstance(given, str) else given
 
 
 #: methods of an element that give its law

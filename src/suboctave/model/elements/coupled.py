@@ -97,7 +97,7 @@ def _without_surfaces(element: BaseElement) -> InputError:
 
 def _input_place(owner: str, given: Any) -> Place:
     is_vector = isinstance(given, np.ndarray) or (
-        isinstance(given, Sequence) and any(not isinstance(entry, int | np.integer) for entry in given)
+        isinstance(given, Sequence) and any(not isinstance(entry, int | np.integer | str) for entry in given)
     )
     return Place(f"{owner}, inputs", *((None, given) if is_vector else (given, None)))
 
