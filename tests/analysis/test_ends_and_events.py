@@ -34,7 +34,7 @@ def test_max_points_in_words():
     system = so.library.duffing(c=0.1, F=0.3)
     curve = so.frequency_response(system, (3.0, 0.5), stepping=so.SteppingOptions(max_points=20))
     assert len(curve) == 20
-    assert curve.ended == f"20 points computed at omega = {curve.omega[-1]:.6g}; raise max_points to go on"
+    assert curve.ended == f"20 points computed at omega = {curve.omega[-1]:.6g}. Raise max_points to go on"
     assert curve.ended in repr(curve)
 
 

@@ -123,12 +123,13 @@ def test_files_hold_why_a_curve_ended_and_older_ones_are_read_by_their_sentence(
     [
         "reached the end of the range at omega = 1.3",
         "the curve closed on itself",
-        "20 points computed at omega = 2; raise max_points to go on",
+        "20 points computed at omega = 2. Raise max_points to go on",
         "what follows omega = 2 could not be computed: {odd}; what was computed is kept",
         "step size fell below 1e-07 at j = 0.1: {odd}. Try more harmonics, a smoother law, or a smaller min_step",
-        "met the T motion at its period doubling at omega = 2.3",
+        "reached the T motion at its period doubling at omega = 2.3",
         "interrupted at F = 1 in one direction, in words; what was computed is kept",
-        "left the range after a; no solution was found exactly on its end in one direction, interrupted at b; what was "
+        "left the range after a, without a solution on its end. Move the bound a little in one direction, "
+        "interrupted at b; what was "
         "computed is kept in the other",
     ],
 )

@@ -234,7 +234,7 @@ def test_a_motion_from_elsewhere_starts_no_curve_outside_the_range(hardening):
         try:
             curve = so.frequency_response(system, bounds, harmonics=5, start=start)
         except so.ConvergenceError as failure:
-            refused += "the nearest one lies at omega" in str(failure)
+            refused += "the nearest one is at omega" in str(failure)
             continue
         assert curve.omega[0] == bounds[0]
         assert min(bounds) <= curve.omega.min() <= curve.omega.max() <= max(bounds)

@@ -284,7 +284,7 @@ def test_from_a_file(weak, tmp_path):
 def test_what_cannot_be_switched_at(weak):
     with pytest.raises(InputError, match="only turns back"):
         so.switch_branch(weak.bifurcations["LP"][0])
-    with pytest.raises(InputError, match="does not split"):
+    with pytest.raises(InputError, match="no other branch leaves"):
         so.switch_branch(weak.grazings[0])
     with pytest.raises(InputError, match=r"must be a Bifurcation, not Branch"):
         so.switch_branch(weak)
@@ -318,6 +318,6 @@ def test_a_step_that_ends_right_on_the_parent_has_met_it():
     both = [so.switch_branch(item) for item in doublings]
     for branch in both:
         assert [b.kind for b in branch.bifurcations] == ["LP"] * 3
-        assert "met the T motion" in branch.ended
+        assert "reached the T motion" in branch.ended
     first, last = (sorted(b.omega for b in branch.bifurcations) for branch in both)
     np.testing.assert_allclose(first, last, rtol=1e-9)

@@ -36,7 +36,7 @@ INTERNAL = (
     "two points fall together at",
     "the search left the positive frequencies",
     "not settled within {} passes",
-    "shooting with free omega did not arrive",
+    "shooting with free omega did not converge",
     "no {} found along the curve of periodic motions",
     "the pair of multipliers followed became real",
     "no branch point {}: no second branch crosses there",
@@ -75,7 +75,7 @@ def texts() -> tuple[str, ...]:
 @cache
 def patterns() -> list[str]:
     """The messages of the page, first column of its tables."""
-    _, page = (DOCS / "messages.md").read_text(encoding="utf-8").split("## Why a curve ended")
+    _, page = (DOCS / "messages.md").read_text(encoding="utf-8").split("## The curve ends")
     return re.findall(r"^\| `([^`]+)` \|", page, re.M)
 
 
@@ -144,6 +144,33 @@ def _sentences(module: str) -> list[str]:
 def test_the_page_has_what_a_module_says(module):
     missing = [text for text in _sentences(module) if not _known(text) and not any(part in text for part in PARTS)]
     assert not missing, "\n".join(missing)
+
+
+#: with these a message says what to change
+REMEDIES = re.compile(
+    r"\b(use|try|give|take|check|keep|move|begin|start|declare|raise|add|write|return|leave|choose|track|reduce|name|draw|"
+    r"replace|write|smaller|larger|more)\b",
+    re.I,
+)
+
+
+def test_a_long_message_ends_with_what_to_do():
+    """Of more than 200 characters, the last sentence or clause says what to change."""
+    silent = []
+    for tree in trees():
+        for node in ast.walk(tree):
+            name = getattr(node.func, "id", getattr(node.func, "attr", "")) if isinstance(node, ast.Call) else ""
+            texts = (_text(one) for one in node.args) if name.endswith(("Error", "Warning", "Note")) else ()
+            for text in filter(None, texts):
+                last = re.split(r"[.;] (?=\w)|: (?=[a-z])", text)[-1]
+                if len(text) > 200 and not REMEDIES.search(last):
+                    silent.append(text)
+    assert not silent, "\n".join(silent)
+
+
+def test_messages_of_the_page_are_short_or_end_with_what_to_do():
+    long = [one for one in patterns() if len(one) > 200 and not REMEDIES.search(re.split(r"[.;] (?=\w)|: (?=[a-z])", one)[-1])]
+    assert not long, "\n".join(long)
 
 
 def test_what_is_called_internal_is_in_the_source():

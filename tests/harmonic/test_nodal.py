@@ -149,7 +149,7 @@ def test_a_law_that_cannot_be_sampled_is_no_false_result():
         def coefficient_curvature(self, u, v, c):
             return np.zeros((0, 0, len(u)))
 
-    with pytest.raises(ConvergenceError, match="does not settle"):
+    with pytest.raises(ConvergenceError, match="do not resolve the force"):
         state_of(Hidden(0), wave(5, c1=0.7, s3=0.123))
 
 

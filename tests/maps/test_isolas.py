@@ -342,7 +342,7 @@ def test_wherever_a_time_limit_falls_the_search_says_so(share, monkeypatch, look
     assert found.interruption == Interruption(share * looks_of_a_search)
     assert any("the time limit of" in note for note in found.notes)
     assert found.summary.startswith("Incomplete, the time limit of")
-    assert "values of F" in found.summary.split("Not looked at: ")[1]
+    assert "values of F" in found.summary.split("Not searched: ")[1]
     assert not any(branch.interrupted for isola in found for branch in isola.known.values())
     assert not any(curve.interrupted for curve in (*found.limit_points, *found.doublings))
 

@@ -99,7 +99,7 @@ ROWS = [
     ("a limit point", SWITCH, SWITCH.replace("BP", "LP"), ["only turns back", "takes a PD or a BP"],
      "analyses[2].start", '"LP"'),
     ("a Neimark-Sacker point", SWITCH, SWITCH.replace("BP", "NS"), ["quasi-periodic"], "analyses[2].start", '"NS"'),
-    ("a grazing contact", SWITCH, SWITCH.replace("BP", "grazing"), ["does not split"], "analyses[2].start", "grazing"),
+    ("a grazing contact", SWITCH, SWITCH.replace("BP", "grazing"), ["no other branch"], "analyses[2].start", "grazing"),
     ("two choices at once", SWITCH, SWITCH.replace("index = 0", "point = 1"), ["not by several"], "analyses[2].start",
      "point = 1"),
     ("side two", "side = 1", "side = 2", ["1 or -1"], "analyses[2].side", "side = 2"),

@@ -74,7 +74,7 @@ def test_wrong_multipliers_are_found(duffing_curve, to):
     check = so.verify(wrong, points=[29, 30, 31], bifurcations=False)
     (bad,) = check.disagreements
     assert bad.index == 30
-    assert ("the opposite" if to > 1.0 else "other multipliers") in bad.reason
+    assert ("the opposite" if to > 1.0 else "Multipliers of shooting differ") in bad.reason
 
 
 @pytest.mark.parametrize(

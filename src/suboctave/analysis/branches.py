@@ -254,9 +254,9 @@ _BESIDE = 1e-3
 _LARGEST = 1e12
 
 _NO_OTHER = {
-    "LP": "at a limit point the branch only turns back, and nothing leaves it",
-    "NS": "what leaves at a Neimark-Sacker point is quasi-periodic: no branch of periodic motions",
-    "grazing": "a contact that begins to touch does not split the branch",
+    "LP": "at a limit point the branch turns back, no other branch leaves",
+    "NS": "at a Neimark-Sacker point quasi-periodic motions leave, no branch of periodic motions",
+    "grazing": "at a grazing contact no other branch leaves",
 }
 
 

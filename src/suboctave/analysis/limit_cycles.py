@@ -148,7 +148,9 @@ def _first_cycle(hopf: Bifurcation, name: str, ends: tuple[float, float], harmon
     low, high = min(ends), max(ends)
     state = hopf.orbit.state()
     if hopf.null_vectors is None:
-        raise ConvergenceError("this Hopf point could only be bracketed: what begins there is not known")
+        raise ConvergenceError(
+            "this Hopf point is bracketed, not solved for: its cycles are unknown. Use a law that is smooth there"
+        )
     vector = hopf.null_vectors.right
     shape = shape_of(vector, state.balance.size, state.balance.row_weights(len(vector)))
     unit = _noticed(state, shape, name, _ASIDE * (high - low))
@@ -211,8 +213,8 @@ def _one_of_several(hopf: Bifurcation, name: str, ends: tuple[float, float], har
             cycles.append(cycle)
     if not cycles:
         raise ConvergenceError(
-            f"{m} Hopf points fall together at {name} = {hopf.parameter(name):.6g}, and no cycle beside them can be "
-            "told from others as small as it: begin at a larger one, an orbit that integrate comes to"
+            f"{m} Hopf points coincide at {name} = {hopf.parameter(name):.6g}, and small cycles beside them are not "
+            "distinguishable. Start from a larger cycle, the orbit at the end of so.integrate"
         ) from failure
     chosen = independent(found, m)
     # with fewer cycles than Hopf points some share one

@@ -160,9 +160,8 @@ def _settings(item: Bifurcation, turning: str, options: TrackOptions) -> Setting
     """The options, checked, with those of curves of bifurcations as defaults."""
     if item.kind == "LP" and repeats_earlier(item.orbit):
         raise InputError(
-            f"this limit point is written with {item.orbit.basis.nu} load periods but repeats earlier: thus "
-            "every period doubling is one, and its curve is that of the doublings; track the PD, or a limit point "
-            "of the branch that switch_branch gives"
+            f"this limit point is written with {item.orbit.basis.nu} load periods but repeats earlier, so that its "
+            "curve is that of the period doublings. Track the PD, or a limit point of the branch from switch_branch"
         )
     given = {name: value for name, value in options.items() if value is not None}
     default = {"stepping": _STEPPING, "observe": Inherited(item).observe}

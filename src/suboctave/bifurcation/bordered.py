@@ -221,7 +221,7 @@ def branching_equation(
     inside = b * b - a * c
     if not inside > _DISTINCT * largest**2:
         raise ConvergenceError(
-            f"the branches at this branch point cannot be told apart (branching equation {c:.2e} s^2 + {2 * b:.2e} s r "
+            f"the branches at this branch point cannot be separated (branching equation {c:.2e} s^2 + {2 * b:.2e} s r "
             f"+ {a:.2e} r^2)"
         )
     root = b + math.copysign(math.sqrt(inside), b)

@@ -54,20 +54,19 @@ _SENTENCES = {
     EndReason.START: "",
     EndReason.NOT_STARTED: "not started",
     EndReason.RANGE_END: "reached the end of the range at {where}",
-    EndReason.LEFT_RANGE: "left the range after {where}; no solution was found exactly on its end",
+    EndReason.LEFT_RANGE: "left the range after {where}, without a solution on its end. Move the bound a little",
     EndReason.CLOSED: "the curve closed on itself",
     EndReason.NOT_FINITE: "the motions end at {where}: beyond it {detail}",
     EndReason.STEP_TOO_SMALL: (
         "step size fell below {detail}. Try more harmonics, a smoother law, or a smaller min_step"
     ),
-    EndReason.MAX_POINTS: "{detail} points computed at {where}; raise max_points to go on",
+    EndReason.MAX_POINTS: "{detail} points computed at {where}. Raise max_points to go on",
     EndReason.ASTRAY: (
-        "came back to {where} without having passed its start: where two branches nearly touch it went over to another "
-        "one. Try a smaller max_step"
+        "came back to {where} without passing its start: it jumped to a neighbouring branch. Try a smaller max_step"
     ),
     EndReason.RETRACED: (
-        "came back along itself to {where}: at a turn sharper than its steps or its harmonics show it lost its "
-        "direction. Try more harmonics, or a smaller max_step"
+        "retraced itself back to {where}: a turn is sharper than its steps or its harmonics resolve. Try more "
+        "harmonics, or a smaller max_step"
     ),
     EndReason.FAILED: "what follows {where} could not be computed: {detail}; what was computed is kept",
     EndReason.INTERRUPTED: "interrupted at {where}; what was computed is kept",

@@ -162,7 +162,7 @@ def _corrected(low: MotionProblem, wide: MotionProblem, guess: Array, row: Array
                     break
             share *= 0.5
             if share < _SHORTEST:
-                raise ConvergenceError(f"the iteration for {where} leads away")
+                raise ConvergenceError(f"the iteration for {where} diverges")
         u, here = u - share * step, there
     raise ConvergenceError(f"no motion was found with {where}, beside that of {few}")
 

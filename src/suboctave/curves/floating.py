@@ -82,6 +82,6 @@ def unheld(state: BalanceState, direction: Array) -> str:
     names = [system.dof_names[i] if system.dof_names else str(i) for i in most[:_SHOWN]]
     shown = f"DOF {', '.join(names)}{', ...' * (len(most) > _SHOWN)}"
     return (
-        f"nothing holds {shown}, whose mean position is arbitrary there (it floats between its stops, or has no "
-        "stiffness). Give it a small stiffness, or a load that reaches a stop"
+        f"nothing holds {shown}: its mean position is arbitrary (it floats between its stops, or has no stiffness). "
+        "Give it a small stiffness, or a load that reaches a stop"
     )

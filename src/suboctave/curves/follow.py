@@ -139,7 +139,7 @@ class _Follower(Driver):
             self._size = size, _GROWN[0] if last.still else _GROWN[1]
         if size <= self._size[0] * self._size[1]:
             return None
-        detail = f"the motions grow without bound at {last.where}, where the parameters stand still"
+        detail = f"the motions grow without bound at {last.where}, at constant parameters"
         return Ending(EndReason.NO_MEANING, last.where, detail)
 
     def _beyond_corner(self) -> CurvePoint | None:

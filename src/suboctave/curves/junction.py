@@ -231,7 +231,7 @@ def meeting(a: CurvePoint, b: CurvePoint, newton: NewtonOptions) -> Meeting | No
     where = motions.where(there)
     last = float((a if before is None else before).u[-1])
     doubt = None if smooth else unseen(motions.name, last, float(there[-1]))
-    reason = f"met the {period_name(basis.nu // 2)} motion at its period doubling at {where}"
+    reason = f"reached the {period_name(basis.nu // 2)} motion at its period doubling at {where}"
     arrival = Arrival(before, Ending(EndReason.MET_BRANCH, where, reason))
     return Meeting(doubling, parent, arrival, doubt, several, finer)
 

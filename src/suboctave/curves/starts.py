@@ -105,10 +105,9 @@ def check_unknowns(size: int, basis: HarmonicBasis) -> None:
     unknowns = size * basis.size
     if unknowns > _DENSE_UNKNOWNS:
         raise InputError(
-            f"{size} DOFs with {basis.harmonics // basis.nu} harmonics are {unknowns} unknowns with dense matrices, "
-            f"more than {_DENSE_UNKNOWNS}: keep fewer harmonics, or reduce the model before it becomes a System, for "
-            "example to its lowest modes P (n, m): System(P.T @ M @ P, P.T @ C @ P, P.T @ K @ P, ...), elements and "
-            "loads with direction=P[dof] in place of dof="
+            f"{unknowns} unknowns ({size} DOFs with {basis.harmonics // basis.nu} harmonics) are more than the "
+            f"{_DENSE_UNKNOWNS} for which dense matrices fit. Keep fewer harmonics, or reduce the model to its lowest "
+            "modes P: System(P.T @ M @ P, P.T @ C @ P, P.T @ K @ P, ...), with direction=P[dof] in place of dof="
         )
 
 
@@ -224,8 +223,8 @@ def start_point(
         raise ConvergenceError(f"no motion found to start from at {where}: {loose}, or start elsewhere in the range")
     if wall is not None:
         raise NotFiniteError(
-            f"no motion found to start from at {where}: on the way {wall}. Give start= (an orbit, or a state), on the "
-            "side of that place that is meant"
+            f"no motion found to start from at {where}: {wall}. Give start= (an orbit, or a state) on one side of that "
+            "place"
         )
     raise ConvergenceError(
         f"no motion found to start from at {where}{loose or ''}. Tried: " + "; ".join(tried) + ". "
@@ -251,7 +250,7 @@ def _beside_given(
             if low - slack <= nearest.parameter <= high + slack:
                 return nearest
             where = curve.where(nearest.u)
-            hint = f"the nearest one lies at {where}; begin the range there, or start from another"
+            hint = f"the nearest one is at {where}. Begin the range there, or give another start"
     raise ConvergenceError(f"no motion found from the given start at {curve.where(guess)}: {hint or failure}")
 
 
@@ -398,9 +397,9 @@ def _check_no_rotation(system: System, trajectory: Trajectory) -> None:
         dof = int(np.argmax(turned))
         name = system.dof_names[dof] if system.dof_names else f"x_{dof}"
         raise ConvergenceError(
-            f"the motion from this state turns: {name} grows by {away[dof]:.6g} in its period. Harmonic balance "
-            "describes motions that come back to where they began; follow what turns in time, with the angle declared "
-            "(angles= of the system): so.brute_force_diagram, so.basins, so.lyapunov_exponents"
+            f"{name} grows by {away[dof]:.6g} in a period: this motion rotates, which harmonic balance does not "
+            "describe. Declare the angle (angles= of the system) and use so.brute_force_diagram, so.basins or "
+            "so.lyapunov_exponents"
         )
 
 

@@ -347,4 +347,6 @@ class Trace:
         self.audit = replace(self.audit, unsettled=tuple(u for u in self.audit.unsettled if u.arclength[1] <= end))
         self.closed, self.arrives = False, replace(item, arclength=end)
         where = f"{item.parameter_name} = {item.parameter(item.parameter_name):.6g}"
-        self.ends(Ending(EndReason.MET_BRANCH, where, f"met the branch that it leaves at the branch point at {where}"))
+        self.ends(
+            Ending(EndReason.MET_BRANCH, where, f"reached the branch that it leaves, at the branch point at {where}")
+        )

@@ -140,12 +140,10 @@ class Arbitration(StabilityMethod):
         if result.decided:
             return result
         if result.undamped:
-            return replace(
-                result, note="Undamped: multipliers stay on the unit circle, and nothing settles the verdict"
-            )
+            return replace(result, note="Undamped: multipliers stay on the unit circle, stability is undecided")
         size = 2 * state.balance.size * (2 * state.basis.harmonics + 1)
         if size > limit:
-            skipped = f"Witnesses, with matrices of {size} rows, are not asked along a curve, but by so.stability"
+            skipped = f"A check with matrices of {size} rows is left out along curves: use so.stability(orbit)"
             return replace(result, note=f"{_open(result)}. {skipped}")
         results, joint, contradictions = [result], result, []
         for witness in self.witnesses:
@@ -225,8 +223,8 @@ def _explanation(
         return ". ".join([_open(first), *contradictions, settled])
     sentences = [_open(joint), *contradictions, *(r.note for r in others if not r.applicable)]
     sentences.append(
-        f"More harmonics than the motion's {state.basis.harmonics} would settle it, or shooting (so.verify), unless "
-        "the motion is itself a bifurcation point"
+        f"Use more harmonics than the motion's {state.basis.harmonics}, or so.verify, unless the motion is itself a "
+        "bifurcation"
     )
     return ". ".join(sentences)
 

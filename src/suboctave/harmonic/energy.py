@@ -47,7 +47,7 @@ def at_rest(balance: HarmonicBalance, omega: float, values: Mapping[str, float])
         x[0] -= step
         if length(step) <= _STILL * length(x[0]):
             return balance.at(x, omega, values)
-    raise ConvergenceError("the constant loads have no position of rest that Newton's method finds from zero")
+    raise ConvergenceError("no equilibrium under the constant loads was found from zero")
 
 
 #: zeta whose forces are lost among those of inertia

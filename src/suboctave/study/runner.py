@@ -275,7 +275,7 @@ def analysed(
     except Exception as error:
         last = traceback.extract_tb(error.__traceback__)[-1]
         place = f"{Path(last.filename).name}, line {last.lineno}"
-        failure = f"an error that nobody has foreseen, please report it: {type(error).__name__}: {error} ({place})"
+        failure = f"an unexpected error, please report it: {type(error).__name__}: {error} ({place})"
     if outcome is not None and not failure:
         interruption = interruption or outcome.interruption
     return Finished(step, outcome, perf_counter() - begin, False, failure, wrong, interruption)

@@ -95,14 +95,14 @@ class Motions:
         if self.failed.any():
             first = int(np.flatnonzero(self.failed)[0])
             raise ConvergenceError(
-                f"{int(self.failed.sum())} of {len(self.failed)} trajectories (the first is number {first}) left the "
-                "range of numbers, or needed too many steps: the motion grows without bound, a force is not finite "
-                "where it goes, or the highest natural frequency is far above that of the load (take Newmark's method)"
+                f"{int(self.failed.sum())} of {len(self.failed)} trajectories (the first is number {first}) overflow "
+                "or need too many steps. Check the sign of the damping and the range of the forces, or use "
+                'method="newmark" for high natural frequencies'
             )
         if self.unsettled.any():
             raise ConvergenceError(
-                f"Newmark's method did not solve {int(self.unsettled.sum())} of its steps: take more steps_per_period "
-                'than now, or method="accurate"'
+                f"Newmark's method did not solve {int(self.unsettled.sum())} of its steps. Use more steps_per_period, "
+                'or method="accurate"'
             )
         return self
 

@@ -89,9 +89,8 @@ def _step(solver: DOP853, model: Field) -> None:
     if solver.status == "failed" or not np.all(np.isfinite(state)):
         raise ConvergenceError(
             f"the integration stopped at t = {solver.t / model.omega:.6g} (omega = {model.omega:.6g}): {message}. "
-            "The motion grows without bound, or an element returns values that are not finite: check its force over "
-            f"the range reached (largest scaled component {np.max(np.abs(state)):.3g}), the sign of "
-            "the damping, and the state at the start"
+            f"The motion grows without bound (largest scaled component {np.max(np.abs(state)):.3g}), or a force is not "
+            "finite. Check the sign of the damping, the forces over this range, and the state at the start"
         )
 
 

@@ -108,7 +108,7 @@ class Curve:
             u = u + step * min(1.0, 0.5 / length if length > 0.0 else 1.0)
             previous = residual
         raise ConvergenceError(
-            f"shooting with free omega did not arrive near omega = {u[-1] * self.model.reference:.9g} (relative "
+            f"shooting with free omega did not converge near omega = {u[-1] * self.model.reference:.9g} (relative "
             f"residual {residual:.1e} after {_CORRECTIONS} steps): start closer, for instance from shoot(...) on the "
             "same branch"
         )

@@ -125,10 +125,9 @@ def shoot(
             share *= 0.5
         y = trial
     raise ConvergenceError(
-        f"shooting at omega = {omega:.9g} over {periods} period(s) did not arrive: relative residual "
+        f"shooting at omega = {omega:.9g} over {periods} period(s) did not converge: relative residual "
         f"{history[0]:.1e} at the start, {min(history):.1e} at best, {history[-1]:.1e} after {max_iterations} steps. "
-        "Start closer to the motion (from a harmonic-balance orbit, or from the end of a long integrate(...)); close "
-        "to a limit point use locate_by_shooting, which leaves omega free"
+        "Start closer to the motion, or close to a limit point use locate_by_shooting, which leaves omega free"
     )
 
 

@@ -24,6 +24,6 @@ def up_to_harmonics(motion: PeriodicOrbit, distance: float) -> str:
     """What is said where shooting and harmonic balance differ by no more than that."""
     high = motion.basis.harmonics
     return (
-        f"The same motion as far as {high} harmonics tell, which leave out as much (relative distance {distance:.1e}, "
-        "of velocities, too): keep more of them, or give a larger tolerance"
+        f"The same motion within the truncation error of {high} harmonics (relative distance {distance:.1e}, "
+        "velocities included): use more harmonics, or a larger tolerance"
     )

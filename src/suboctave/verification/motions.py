@@ -93,8 +93,8 @@ def verify_motion(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: fl
     floquet = known or method_of(None).multipliers(motion.state())
     if floquet.method == "none":
         raise InputError(
-            f"there is nothing to hold this motion against by itself, {floquet.note}: so.verify(curve, points=[...]) "
-            "integrates motions of its curve with the damping that keeps them going"
+            f"no independent check of this motion alone, {floquet.note}: use so.verify(curve, points=[...]), which "
+            "integrates motions of its curve with the damping that sustains them"
         )
     whole = motion.start()
     start = system.reduced(whole)
@@ -120,7 +120,7 @@ def verify_motion(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: fl
         what_failed = "shooting found no motion from here" if kind is None else "shooting did not locate it"
         largest = float(np.abs(floquet.multipliers).max(initial=0.0))
         if kind is None and largest * max(motion.truncation, _DIGITS) > 1.0:
-            reason = f"A multiplier of {largest:.1e} makes what is left out as large as the motion within its period"
+            reason = f"A multiplier of {largest:.1e} amplifies the truncation error to the size of the motion"
             return Verification(math.inf, math.inf, None, OPEN, None, f"{reason}: {what_failed}", projection)
         return Verification(math.inf, math.inf, None, DISAGREES, None, f"{what_failed}: {failure}", projection)
     distance = max(distance_of(system, motion, start, solution), solution.residual)
@@ -139,13 +139,13 @@ def verify_motion(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: fl
             words = f"Shooting sees multipliers cross as at {KINDS[kind].words} close to omega = {solution.omega:.9g}"
         same = distance <= tolerance
         if same and off > tolerance + floquet.error + 100.0 * distance:
-            words += f"; its multipliers are others (off by {error:.1e}, which their errors do not cover)"
+            words += f"; its multipliers differ by {error:.1e}, more than their errors"
         return verdict(same, words if same else f"{words}: another one (relative distance {distance:.1e})")
     if not distance <= tolerance:
         if not touches and distance <= left_out(motion):
             return verdict(False, up_to_harmonics(motion, distance), OPEN)
         other = "a motion that does not graze" if touches else "another motion"
-        return verdict(False, f"Shooting arrives at {other} (relative distance {distance:.1e})")
+        return verdict(False, f"Shooting converges to {other} (relative distance {distance:.1e})")
     if alone and isinstance(what, Bifurcation) and what.kind in LOCATED:
         return verdict(*_as_critical(what, solution, tolerance))
     # at an extremum or a point of codimension two, and of what nothing drives, a multiplier is critical: no verdict to
@@ -154,14 +154,14 @@ def verify_motion(what: PeriodicOrbit | BranchPoint | Bifurcation, tolerance: fl
         margin = abs(float(np.abs(solution.multipliers).max()) - 1.0)
         if margin <= max(tolerance, floquet.error):
             near = f"the largest multiplier lies {margin:.1e} from the unit circle"
-            return verdict(False, f"The same motion; {near}, too near to compare verdicts", OPEN)
+            return verdict(False, f"The same motion; {near}, too close to compare stability", OPEN)
         other = "stable" if solution.stable else "unstable"
-        return verdict(False, f"Shooting calls it {other}, harmonic balance the opposite")
+        return verdict(False, f"By shooting it is {other}, by harmonic balance the opposite")
     if alone or isinstance(what, TrackedEvent):
         return verdict(True, "The same motion")
     if off > tolerance + _COVERED * floquet.error + 100.0 * distance:
-        return verdict(False, f"Shooting finds other multipliers (off by {error:.1e}) with the same verdict")
-    return verdict(True, "The same motion, the same verdict")
+        return verdict(False, f"Multipliers of shooting differ by {error:.1e}, stability is the same")
+    return verdict(True, "The same motion, the same stability")
 
 
 def _as_critical(what: Bifurcation, solution: PeriodicSolution, tolerance: float) -> tuple[bool, str]:
@@ -177,7 +177,7 @@ def _as_critical(what: Bifurcation, solution: PeriodicSolution, tolerance: float
     if folds and solution.residual > tolerance:
         return (
             False,
-            f"From there the motion misses its beginning after a period by {solution.residual:.1e} of its size",
+            f"Integrated over a period from there, the motion misses its start by {solution.residual:.1e} of its size",
         )
     return miss <= allowed, words
 

@@ -171,7 +171,7 @@ class BranchVerification(TimeResult):
         if bad:
             text += f", {len(bad)} disagree{'s' * (len(bad) == 1)}, the first at omega = {bad[0].omega:.6g}"
         if left:
-            text += f", of {len(left)} nothing can be told"
+            text += f", {len(left)} undecided"
         confirmed = sum(item.agrees for item in self.bifurcations)
         if self.bifurcations:
             text += f"; {confirmed} of {len(self.bifurcations)} bifurcations are confirmed"

@@ -144,9 +144,9 @@ def _judged(branch: Branch, i: int, shot: Shot, tolerance: float) -> VerifiedPoi
     stable, error, off, known, undecided = None, math.inf, math.inf, floquet.applicable, False
     computed = branch.stable_at(point)
     if not shot.converged:
-        outcome, reason = OPEN, "Shooting did not arrive at a motion from here"
+        outcome, reason = OPEN, "Shooting did not converge from here"
         if distance > 100.0 * tolerance or not np.isfinite(distance):
-            outcome, reason = DISAGREES, "Shooting finds no motion near: it leaves the place"
+            outcome, reason = DISAGREES, "Shooting finds no motion nearby"
         distance, multipliers = math.inf, multipliers[:0]
     else:
         deciding = branch.deciding(point, multipliers)
@@ -167,23 +167,26 @@ def _judged(branch: Branch, i: int, shot: Shot, tolerance: float) -> VerifiedPoi
         if tolerance < distance <= left_out(point.orbit):
             outcome, reason = OPEN, up_to_harmonics(point.orbit, distance)
         elif distance > tolerance:
-            outcome, reason = DISAGREES, f"Shooting arrives at another motion (relative distance {distance:.1e})"
+            outcome, reason = DISAGREES, f"Shooting converges to another motion (relative distance {distance:.1e})"
         elif isinstance(branch, ModeCurve) and branch.damped:
-            stable, outcome, reason = None, AGREES, "The same motion, kept going by the same damping"
+            stable, outcome, reason = None, AGREES, "The same motion, sustained by the same damping"
         elif not known:
-            outcome, reason = OPEN, "The same motion; the branch has no verdict here"
+            outcome, reason = OPEN, "The same motion; the branch leaves its stability open"
         elif computed != stable and abs(margin) <= max(tolerance, doubt):
             near = f"the largest multiplier lies {abs(margin):.1e} from the unit circle"
-            outcome, reason = OPEN, f"The same motion; {near}, too near to compare verdicts"
+            outcome, reason = OPEN, f"The same motion; {near}, too close to compare stability"
         elif computed != stable and undecided:
-            outcome, reason = OPEN, "The same motion; harmonic balance has a multiplier within its error of the circle"
+            outcome, reason = (
+                OPEN,
+                "The same motion; a multiplier of harmonic balance lies within its error of the unit circle",
+            )
         elif computed != stable:
             verdict = "stable" if stable else "unstable"
-            outcome, reason = DISAGREES, f"Shooting calls it {verdict}, harmonic balance the opposite"
+            outcome, reason = DISAGREES, f"By shooting it is {verdict}, by harmonic balance the opposite"
         elif off > allowed:
-            outcome, reason = DISAGREES, f"Shooting finds other multipliers (off by {error:.1e}) with the same verdict"
+            outcome, reason = DISAGREES, f"Multipliers of shooting differ by {error:.1e}, stability is the same"
         else:
-            outcome, reason = AGREES, "The same motion, the same verdict"
+            outcome, reason = AGREES, "The same motion, the same stability"
     return VerifiedPoint(
         i, point.orbit.omega, point.orbit.amplitude(branch.observe), distance, multipliers, shot.errors, error,
         stable, computed if known else None, outcome, reason,
@@ -214,7 +217,7 @@ def _confirmed(item: Bifurcation, shot: Shot | None, tolerance: float, observe: 
     if shot is not None and shot.converged and shot.distance <= tolerance:
         if item.kind in CONTACT_KINDS:
             along = distance_from_gap(shot.system.moved_to(item.orbit.values), item, shot.state, shot.omega)
-            words = "The same motion, and it just reaches the gap"
+            words = "The same motion, which just reaches the gap"
         else:
             along, words = abs(shot.along), f"Shooting finds {_named(item)} at omega = {shot.omega_there:.9g}"
         if along <= tolerance:

@@ -127,7 +127,7 @@ def end_between(a: Sample, b: Sample, newton: NewtonOptions, lopsided: bool = Tr
     if standing:
         return End(
             f"the curve ends on the period doublings of the parent motion beside {b.where}: the "
-            "parameters stand still there while the doubled part goes on to vanish, and the GPD was not located"
+            "parameters are constant there while the doubled part vanishes, and the GPD was not located"
         )
     if share <= NOTHING_LEFT:
         return End(

@@ -215,7 +215,7 @@ class _Tracker(Driver):
         self.previous = new
         self._report(point)
         if self._grows(new):
-            detail = f"the motions grow without bound at {new.where}, where the parameters stand still"
+            detail = f"the motions grow without bound at {new.where}, at constant parameters"
             return Ending(EndReason.NO_MEANING, new.where, detail)
         ahead = None if self.march.ending.reason is not EndReason.NOT_STARTED else end_ahead(a, new, settings.newton)
         if ahead is None:

@@ -287,11 +287,9 @@ class GeneralLaw(LawAlong):
             previous, count = current, 2 * count
         self._require_room(member)
         raise ConvergenceError(
-            f"{member.element.label}: the force does not settle with {MOST} samples per period: it is too sharp to be "
-            "sampled blindly. Of a text (Expression) places are known where it has corners (abs, max, ...), or is "
-            "sharp as tanh or atan of one velocity times a polynomial; a class of your own can tell them (sampling "
-            "returning SharpSampling(points, widths) or CornerSampling). Elements that are exact: ElasticStop, "
-            "Freeplay, TanhFriction"
+            f"{member.element.label}: {MOST} samples per period do not resolve the force, it is too sharp. Write it as "
+            "an Expression with abs, max, tanh or atan, use ElasticStop, Freeplay or TanhFriction, or return "
+            "SharpSampling(points, widths) or CornerSampling from `sampling` of your class"
         )
 
     def unbounded_at(self, member: Member) -> float | None:

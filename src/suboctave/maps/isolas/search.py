@@ -195,14 +195,14 @@ class Search:
         if catalogue.interruption is not None:
             missing = _listed(stage.left for stage in self.stages if stage.done < stage.planned)
             summary = (
-                f"Incomplete, {catalogue.interruption}: {count} so far {where}; {followed}. Not looked at: {missing}."
+                f"Incomplete, {catalogue.interruption}: {count} so far {where}; {followed}. Not searched: {missing}."
             )
         elif isolas:
             summary = f"{count} {where}; {followed}."
         else:
             known = {p.nu for p in catalogue.limit_points} | {1} | self.periods
             periods = _listed(period_name(nu) for nu in sorted(known))
-            summary = f"No isola of {periods} motions was found {where}: {followed} show none."
+            summary = f"No isola of {periods} motions was found {where}: {followed} have none."
         self._note_breaks()
         asked = catalogue.system, catalogue.name, catalogue.bounds, (first, last)
         return Isolas(isolas, *asked, limit_points, doublings, catalogue.notes, summary, catalogue.interruption)
@@ -219,9 +219,8 @@ class Search:
                 if any(c.nu == curve.nu and lies_on(orbit, c.points, name, True) for c in curves if c is not curve):
                     continue
                 self.catalogue.note(
-                    f"a curve of limit points of {period_name(curve.nu)} motions was followed no further than omega = "
-                    f"{orbit.omega:.6g}, {name} = {orbit.values[name]:.6g} ({ending}): isolas that lie beyond may be "
-                    "missing"
+                    f"limit points of {period_name(curve.nu)} motions were followed up to omega = {orbit.omega:.6g}, "
+                    f"{name} = {orbit.values[name]:.6g} ({ending}): isolas beyond may be missing"
                 )
 
     # ------------------------------------------------------------------------------------- branches at one value
@@ -283,9 +282,9 @@ class Search:
         if branch.nu > 1 and not branch.closed and not branch.junctions:
             middle = branch.orbits[len(branch) // 2]
             catalogue.note(
-                f"whether the {period_name(branch.nu)} branch at omega = {middle.omega:.6g}, {catalogue.name} = "
-                f"{value:.6g} is an isola is open, for it does not close between omega = {branch.omega.min():.6g} and "
-                f"{branch.omega.max():.6g} ({branch.ended}): a wider range of omega may tell"
+                f"the {period_name(branch.nu)} branch at omega = {middle.omega:.6g}, {catalogue.name} = {value:.6g} "
+                f"may be an isola: it does not close between omega = {branch.omega.min():.6g} and "
+                f"{branch.omega.max():.6g} ({branch.ended}). Use a wider range of omega"
             )
         return branch
 
@@ -411,8 +410,8 @@ class _Direction:
     def _open(self, value: float) -> None:
         """It could not be followed further, for a reason that is none of the branch's."""
         self.isola.notes += (
-            f"beyond {self.name} = {value:.6g} it could not be followed, and no event that was found ends it: more "
-            "harmonics or a smaller max_step may tell",
+            f"beyond {self.name} = {value:.6g} it could not be followed, without a located end. Use more harmonics or "
+            "a smaller max_step",
         )
         self._end(value, f"followed up to {self.name} = {value:.9g}, where its limit points were lost")
 
@@ -533,7 +532,7 @@ class _Direction:
                 b = middle.value
         low, high = sorted((a.value, b))
         where = f"between {self.name} = {low:.6g} and {high:.6g}"
-        self.isola.notes += (f"{where} it ceases to be detached, and no event that was found says why",)
+        self.isola.notes += (f"{where} it is no longer detached, without a located merging. Use a smaller max_step",)
         self._end(a.value, f"detached up to {self.name} = {a.value:.6g} at least, no longer at {b:.6g}")
 
 

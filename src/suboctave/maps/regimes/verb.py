@@ -347,8 +347,8 @@ class _GrowingSlice(Slice):
             for stretch in stretches(branch, located):
                 if stretch.stable is None and stretch.width > _NARROW * (high - low):
                     self.catalogue.note(
-                        f"at {self.catalogue.name} = {self.value:.6g} no motion was computed on a stretch of a "
-                        f"{period_name(branch.nu)} branch {stretch.width:.2g} wide in omega: taken for unstable"
+                        f"at {self.catalogue.name} = {self.value:.6g} a {period_name(branch.nu)} branch has no points "
+                        f"over {stretch.width:.2g} of omega, which count as unstable. Use a smaller max_step"
                     )
                 beyond = 2 * branch.nu > self.longest and stretch.doubled
                 if stretch.stable or beyond:
@@ -399,8 +399,8 @@ def _follow_curves_of(branch: Branch, value: float, catalogue: Catalogue) -> Non
     known = [catalogue.known(item, value) for item in branch.bifurcations["LP"]]
     if not any(known) and before == len(catalogue.pieces):
         catalogue.note(
-            f"a branch of {period_name(branch.nu)} motions at {catalogue.name} = {value:.6g} has no limit point that "
-            "could be followed: it is not on the map"
+            f"a {period_name(branch.nu)} branch at {catalogue.name} = {value:.6g} is not on the map: none of its limit "
+            "points could be followed"
         )
 
 
@@ -449,7 +449,7 @@ class _Survey:
             for number, value in enumerate(waiting):
                 if len(self.slices) >= self.most:
                     catalogue.note(
-                        f"max_slices={self.most} values of {catalogue.name} were looked at: narrow strips were not"
+                        f"narrow strips may be missing after {self.most} values of {catalogue.name}: raise max_slices"
                     )
                     return
                 share = len(self.slices) / (len(self.slices) + len(waiting) - number + 3.0)
