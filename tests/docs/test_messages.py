@@ -154,6 +154,11 @@ REMEDIES = re.compile(
 )
 
 
+def _last(text: str) -> str:
+    """The last sentence or clause."""
+    return re.split(r"[.;] (?=\w)|: (?=[a-z])", text)[-1]
+
+
 def test_a_long_message_ends_with_what_to_do():
     """Of more than 200 characters, the last sentence or clause says what to change."""
     silent = []
@@ -162,14 +167,13 @@ def test_a_long_message_ends_with_what_to_do():
             name = getattr(node.func, "id", getattr(node.func, "attr", "")) if isinstance(node, ast.Call) else ""
             texts = (_text(one) for one in node.args) if name.endswith(("Error", "Warning", "Note")) else ()
             for text in filter(None, texts):
-                last = re.split(r"[.;] (?=\w)|: (?=[a-z])", text)[-1]
-                if len(text) > 200 and not REMEDIES.search(last):
+                if len(text) > 200 and not REMEDIES.search(_last(text)):
                     silent.append(text)
     assert not silent, "\n".join(silent)
 
 
 def test_messages_of_the_page_are_short_or_end_with_what_to_do():
-    long = [one for one in patterns() if len(one) > 200 and not REMEDIES.search(re.split(r"[.;] (?=\w)|: (?=[a-z])", one)[-1])]
+    long = [one for one in patterns() if len(one) > 200 and not REMEDIES.search(_last(one))]
     assert not long, "\n".join(long)
 
 

@@ -61,3 +61,11 @@ def test_a_public_name_that_a_page_calls_exists():
     for page in PAGES:
         for name in re.findall(r"\bso\.(\w+)", page.read_text(encoding="utf-8")):
             assert hasattr(suboctave, name), (page.name, name)
+
+
+def test_the_numbers_of_the_safeguards_are_those_of_the_code():
+    page = (DOCS / "theory" / "safeguards.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `([\w.]+)\.(\w+)` \| ([-\d.e]+) \|", page, re.M)
+    assert len(rows) > 30
+    for module, name, value in rows:
+        assert getattr(importlib.import_module(f"suboctave.{module}"), name) == float(value), name

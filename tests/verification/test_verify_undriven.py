@@ -87,7 +87,7 @@ def test_damped_modes_with_the_damping_that_keeps_them_going():
     check = so.verify(curve, every=10)
     assert check.agrees
     assert all(point.agrees and point.stable is None for point in check.points)
-    assert "kept going by the same damping" in check.points[0].reason
+    assert "sustained by the same damping" in check.points[0].reason
     # where forces are linear a larger motion is one as well
     at = len(curve) - 3
     wrong = so.verify(spoilt(curve, at), points=[at - 1, at, at + 1])
