@@ -403,4 +403,6 @@ def test_what_is_in_doubt_of_a_turn_at_a_branch_point_goes_with_the_turn_along_a
     loop = so.switch_branch(along.bifurcations["BP"][0])
     assert loop.closed
     told = sorted(float(words.split("at F = ")[1]) for words in loop.warnings if "is in doubt" in words)
-    assert told == pytest.approx(sorted(b.parameter("F") for b in loop.bifurcations["LP"]), rel=1e-8)
+    # mirror images share their place, and the line on it
+    folds = {float(f"{b.parameter('F'):.9g}") for b in loop.bifurcations["LP"]}
+    assert told == pytest.approx(sorted(folds), rel=1e-8)

@@ -282,7 +282,7 @@ def test_from_a_file(weak, tmp_path):
 
 # --------------------------------------------------------------------------------------------------------- wrong input
 def test_what_cannot_be_switched_at(weak):
-    with pytest.raises(InputError, match="only turns back"):
+    with pytest.raises(InputError, match="turns back, no other branch"):
         so.switch_branch(weak.bifurcations["LP"][0])
     with pytest.raises(InputError, match="no other branch leaves"):
         so.switch_branch(weak.grazings[0])

@@ -96,7 +96,7 @@ ROWS = [
      "analyses[2].start.indx", "indx"),
     ("unknown kind", SWITCH, SWITCH.replace("BP", "PB"), ["no kind of bifurcation 'PB'"],
      "analyses[2].start.bifurcation", '"PB"'),
-    ("a limit point", SWITCH, SWITCH.replace("BP", "LP"), ["only turns back", "takes a PD or a BP"],
+    ("a limit point", SWITCH, SWITCH.replace("BP", "LP"), ["turns back, no other branch", "takes a PD or a BP"],
      "analyses[2].start", '"LP"'),
     ("a Neimark-Sacker point", SWITCH, SWITCH.replace("BP", "NS"), ["quasi-periodic"], "analyses[2].start", '"NS"'),
     ("a grazing contact", SWITCH, SWITCH.replace("BP", "grazing"), ["no other branch"], "analyses[2].start", "grazing"),
