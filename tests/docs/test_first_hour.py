@@ -152,6 +152,17 @@ def test_a_picture_in_hertz(curve):
     assert axes.get_xlim()[1] < 2.0 / np.pi
 
 
+def test_a_logarithmic_axis_in_axes_of_my_own(curve, system):
+    figure, axes = plt.subplots(1, 2)
+    curve.plot(ax=axes[0], yscale="log")
+    assert axes[0].get_yscale() == "log"
+    weak = so.frequency_response(system.with_parameters(f=0.02), omega=(0.5, 2.0), harmonics=3)
+    so.plot({"0.1 N": curve, "0.02 N": weak}, ax=axes[1])
+    texts = [text.get_text() for text in axes[1].get_legend().get_texts()]
+    assert {"0.1 N", "0.02 N"} <= set(texts)
+    plt.close(figure)
+
+
 @pytest.mark.parametrize("quantity", ["peak_to_peak", "about_mean", "velocity", "phase"])
 def test_a_picture_of_a_quantity(curve, quantity):
     figure = curve.plot(quantity=quantity, dof="x")
