@@ -227,3 +227,32 @@ def test_an_evaluation_needs_all_parameters_and_a_number():
         orbit.balance.at(orbit.x, 1.0, values={})
     with pytest.raises(so.InputError, match="omega must be a number"):
         orbit.balance.at(orbit.x, omega=10**400)
+
+
+DUFFING = so.library.duffing(c=0.1, F=0.3)
+TWO = {"method": so.TwoTrajectories(periods=3, steps_per_period=(100,))}
+#: options that others make idle: the call, and what is idle
+IDLE = {
+    "seeds": (lambda: so.find_isolas(DUFFING, (1, 2), "F", (0.1, 0.2), search=(), seeds=so.Seeds()), "seeds"),
+    "seeds of a map": (lambda: so.regime_map(DUFFING, (1, 2), "F", (0.1, 0.2), seeds=so.Seeds()), "seeds"),
+    "steps": (lambda: so.poincare_sections(DUFFING, 1.0, steps_per_period=50), "steps_per_period"),
+    "two trajectories": (lambda: so.lyapunov_exponents(DUFFING, 1.0, periods=20, count=1, **TWO), "periods=, count"),
+    "seed": (lambda: so.stepped_sine(DUFFING, (1.0, 1.1), seed=3), "seed"),
+    "another omega": (lambda: so.continue_branch(an_orbit(), "F", (0.2, 0.4), omega=2.0), "omega=2.0 differs from"),
+    "workers": (lambda: so.verify(an_orbit(), workers=2), "workers= and progress"),
+    "draws of a grid": (lambda: so.sweep(STUDY, {"F": [0.3]}, sampling="sobol"), "sampling"),
+    "nothing to replace": (lambda: so.sweep(STUDY, {"F": [0.3]}, overwrite=True), "overwrite"),
+}  # fmt: skip
+STUDY = ROOT / "tests" / "study" / "duffing.toml"
+
+
+def an_orbit():
+    return so.frequency_response(DUFFING, (0.5, 0.51), harmonics=3).orbits[0]
+
+
+@pytest.mark.parametrize("name", IDLE)
+def test_an_option_without_effect_is_refused(name):
+    call, words = IDLE[name]
+    with pytest.raises(so.InputError, match=rf"{words}.*(no effect|leave it out|those of a branch)") as caught:
+        call()
+    assert "\n" not in str(caught.value)

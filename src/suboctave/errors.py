@@ -61,6 +61,12 @@ class UnknownName(InputError, KeyError):
     """A name that a mapping does not have; a KeyError too, so that `in` and `get` answer as those of a dictionary."""
 
 
+def refuse_idle(why: str, **given: bool) -> None:
+    """Refuse options that are given and have no effect: which, why, and what to change."""
+    if names := [f"{name}=" for name, there in given.items() if there]:
+        raise InputError(f"{', '.join(names)} {'have' if len(names) > 1 else 'has'} no effect: {why}")
+
+
 class Refusals:
     """Collects the mistakes of an input, so that all of them are told at once."""
 

@@ -10,7 +10,7 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from suboctave.analysis.options import TrackOptions, options_of, settings_of
+from suboctave.analysis.options import SearchOptions, options_of, settings_of
 from suboctave.arguments import Range
 from suboctave.bifurcation.gaps import rests_in_corner
 from suboctave.continuation import CurvePoint, March
@@ -57,7 +57,7 @@ _CONSERVATIVE = 1e-6
 _ROUNDING = 1e-12
 
 
-@with_options(TrackOptions)
+@with_options(SearchOptions)
 @timed
 def nonlinear_mode(
     system: System,
@@ -68,7 +68,7 @@ def nonlinear_mode(
     energy: float | Range | None = None,
     damped: bool | None = None,
     harmonics: Harmonics = "adaptive",
-    **options: Unpack[TrackOptions],
+    **options: Unpack[SearchOptions],
 ) -> ModeCurve:
     """A nonlinear mode: motions that no load keeps going, from a linear mode towards larger amplitudes.
 
@@ -88,8 +88,6 @@ def nonlinear_mode(
         Whether velocity-dependent forces count; False leaves damping matrices out. Default: whether there are any.
     harmonics
         As in `frequency_response`.
-
-    The formulation of bifurcations does not matter here.
 
     Raises
     ------

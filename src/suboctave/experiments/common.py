@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from suboctave.arguments import Count, Positive, checked
-from suboctave.errors import InputError, is_number, shortened, suggest
+from suboctave.errors import InputError, is_number, refuse_idle, shortened, suggest
 from suboctave.model.elements.base import Array, numbers_of
 from suboctave.model.elements.coupled import as_coupled
 from suboctave.model.inputs import (
@@ -133,6 +133,9 @@ def checked_integration(system: System, options: Mapping[str, Any], **defaults: 
     check_is_system(system)
     if not (isinstance(period_tolerance, int | float) and 1e-14 <= period_tolerance < 1.0):
         raise InputError(f"period_tolerance={period_tolerance!r}: give a share of the motion's size, such as 1e-6")
+    if method == "accurate":
+        why = "the accurate method chooses its steps; give method='newmark', or leave it out"
+        refuse_idle(why, steps_per_period=given.get("steps_per_period") is not None)
     steps, observe = steps_of(method, given.get("steps_per_period")), observed_dof(system, given.get("observe"))
     return Integration(method, steps, given.get("tolerance"), period_tolerance, observe, given.get("workers"))
 

@@ -28,7 +28,7 @@ from typing import Annotated, Any, ClassVar, Literal, Unpack, overload
 import numpy as np
 
 from suboctave.arguments import Count, Index, Positive, checked
-from suboctave.errors import ConvergenceError, InputError, shortened, suggest
+from suboctave.errors import ConvergenceError, InputError, refuse_idle, shortened, suggest
 from suboctave.experiments.common import On, SideBySideOptions, TimeResult, check_continuous, of_structures
 from suboctave.experiments.poincare import state_sizes
 from suboctave.model.elements.base import Array
@@ -43,6 +43,8 @@ from suboctave.timedomain.flow import Flow, Motions, check_extent
 _APART = 1e-3
 #: stretches of one trajectory
 _STRETCHES = 4
+#: periods that are left out and averaged over, and trajectories, by default
+_TRANSIENT, _PERIODS, _TRAJECTORIES = 300, 1000, 16
 #: standard errors beyond which the sign of an exponent counts, and what it must be at least, per radian of the load
 _SURE, _LEAST = 5.0, 1e-5
 
@@ -152,10 +154,10 @@ def lyapunov_exponents(
     *,
     start: Any = None,
     parameters: Mapping[str, float] | None = None,
-    transient: Index = 300,
-    periods: Count = 1000,
+    transient: Index = _TRANSIENT,
+    periods: Count = _PERIODS,
     count: Count | None = None,
-    trajectories: Count = 16,
+    trajectories: Count = _TRAJECTORIES,
     method: Literal["variational"] = "variational",
     tolerance: float | None = None,
     **options: Unpack[SideBySideOptions],
@@ -183,10 +185,10 @@ def lyapunov_exponents(
     *,
     start: Any = None,
     parameters: Mapping[str, float] | None = None,
-    transient: Index = 300,
-    periods: Count = 1000,
+    transient: Index = _TRANSIENT,
+    periods: Count = _PERIODS,
     count: Count | None = None,
-    trajectories: Count = 16,
+    trajectories: Count = _TRAJECTORIES,
     method: str | TwoTrajectories = "variational",
     tolerance: float | None = None,
     **options: Unpack[SideBySideOptions],
@@ -210,7 +212,7 @@ def lyapunov_exponents(
     method
         "variational"; or "two_trajectories" (or a `TwoTrajectories` with settings of its own): the rate at which two
         trajectories part, as published studies often give it. It is a finite-time value, and its spread over settings
-        says how far to trust it; `periods`, `transient`, `count`, `trajectories`, `tolerance` do not concern it.
+        says how far to trust it; it takes no `transient`, `periods`, `count`, `trajectories` and `tolerance`.
     tolerance
         Local error relative to the size of the motion (default 1e-10).
 
@@ -230,6 +232,9 @@ def lyapunov_exponents(
     if method == "two_trajectories":
         method = TwoTrajectories()
     if isinstance(method, TwoTrajectories):
+        own = {"transient": transient != _TRANSIENT, "periods": periods != _PERIODS, "count": count is not None,
+               "trajectories": trajectories != _TRAJECTORIES, "tolerance": tolerance is not None}  # fmt: skip
+        refuse_idle("two trajectories are compared; their settings are those of TwoTrajectories(...)", **own)
         with reporting(options.get("progress"), "two trajectories") as report:
             return separate(system, first, omega, values, method, options.get("workers"), report)
     if method != "variational":

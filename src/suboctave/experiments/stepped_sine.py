@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from suboctave.arguments import Range, checked
-from suboctave.errors import InputError, is_number, shortened, suggest
+from suboctave.errors import InputError, is_number, refuse_idle, shortened, suggest
 from suboctave.experiments.common import (
     FEW,
     ComplexArray,
@@ -153,6 +153,7 @@ class _Test:
             raise InputError(
                 f"noise must be a standard deviation in the unit of the response, 0 or more, not {self.noise!r}"
             )
+        refuse_idle("noise is 0; give noise=, or leave seed out", seed=not self.noise and self.seed != 0)
         try:
             self.random = np.random.default_rng(self.seed)
         except (TypeError, ValueError):

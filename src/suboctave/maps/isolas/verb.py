@@ -28,7 +28,7 @@ from suboctave.arguments import Range
 from suboctave.curves.identity import lies_on
 from suboctave.curves.junction import period_name
 from suboctave.curves.starts import Harmonics
-from suboctave.errors import InputError, is_number
+from suboctave.errors import InputError, is_number, refuse_idle
 from suboctave.maps.catalogue import Catalogue, checked_orders, checked_values, listed
 from suboctave.maps.isolas.responses import Responses, UnderOtherLoads, followed_doublings
 from suboctave.maps.isolas.result import Isolas
@@ -110,6 +110,8 @@ def find_isolas(
     processes = check_workers(options.get("workers"))
     other_levels, fine = checked_levels(levels), seeds
     orders = None if search is None else checked_orders(search, 2)
+    if orders == ():
+        refuse_idle("search=() looks for no periods; leave seeds out", seeds=seeds is not None)
     state = Search(catalogue, sorted(set(search_at)), orders or ())
     with catalogue.reporting(options.get("progress"), f"isolas over {parameter}"):
         responses, branches, loads, periods = _planned(state, other_levels, orders)

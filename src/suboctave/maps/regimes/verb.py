@@ -30,7 +30,7 @@ from suboctave.bifurcation.bifurcation import Bifurcation, TrackedEvent
 from suboctave.curves.identity import lies_on, mirrored
 from suboctave.curves.junction import period_name
 from suboctave.curves.starts import Harmonics
-from suboctave.errors import InputError, is_number, shortened
+from suboctave.errors import InputError, is_number, refuse_idle, shortened
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.interruption import pass_on, unlimited
 from suboctave.maps.catalogue import (
@@ -130,6 +130,8 @@ def regime_map(
         raise InputError(f"resolution must be a share of the range between 0 and 0.5, not {resolution!r}")
     followed = _checked_isolas(isolas, parameter)
     orders, fine, given = checked_orders(search, 1), seeds, _checked_motions(motions, catalogue)
+    if not orders:
+        refuse_idle("no periods are looked for; name them in search=, or leave seeds out", seeds=seeds is not None)
     places = [catalogue.bounds[0] + (i + 0.5) / values * catalogue.span for i in range(values)]
     processes = check_workers(options.get("workers"))
     plan = _Survey(catalogue, 2**depth, resolution, max_slices, processes)

@@ -74,6 +74,11 @@ class Plan:
         return dict(zip(self.names, map(float, self.points[number]), strict=True))
 
     @property
+    def drawn(self) -> bool:
+        """Whether points were drawn from distributions."""
+        return "draws" in json.loads(self.origin)
+
+    @property
     def words(self) -> str:
         """How many points, and over what."""
         if self.axes is None:
@@ -123,7 +128,7 @@ def plan_of(
     if not np.isfinite(plan.points).all():
         number, column = np.argwhere(~np.isfinite(plan.points))[0]
         raise InputError(f"{plan.names[column]} has the value {plan.points[number, column]} at point {number}")
-    if draws is not None and "draws" not in json.loads(plan.origin):
+    if draws is not None and not plan.drawn:
         raise InputError("draws are of distributions, and no parameter has one: leave draws out", ("draws",))
     _check_extremes(system, plan)
     return plan

@@ -17,7 +17,7 @@ from typing import Annotated, Any, TypeAlias, Unpack
 
 from suboctave.arguments import READ, Count, Index
 from suboctave.atomic import free_place
-from suboctave.errors import InputError, path_of, shortened
+from suboctave.errors import InputError, path_of, refuse_idle, shortened
 from suboctave.interruption import Interruption, TimeLimitReached
 from suboctave.model.inputs import check_count, timed
 from suboctave.options import ParallelOptions, with_options
@@ -95,6 +95,8 @@ def sweep(
     count = check_workers(options.get("workers"), options.get("scheduler"))
     measure, path = options.get("measure"), options.get("path")
     overwrite, resume = bool(options.get("overwrite")), bool(options.get("resume"))
+    if path is None:
+        refuse_idle("nothing is saved; give path=, or leave it out", overwrite=overwrite, resume=resume)
     if measure is not None and not callable(measure):
         raise InputError(f"measure is a function of the results of a point, not {shortened(measure)}")
     read = study if isinstance(study, Study) else read_study(study, bool(options.get("allow_code")))
@@ -138,6 +140,9 @@ def _asked(study: Study, parameters: Any, options: SweepOptions) -> tuple[Plan, 
     sampling = options.get("sampling") or default.sampling
     listed = default.listed if (most := options.get("listed")) is None else most
     plan = plan_of(study.system, study.steps, parameters, draws, seed, sampling)
+    if not plan.drawn:
+        own = {name: options.get(name) is not None for name in ("seed", "sampling")}
+        refuse_idle("no parameter has a distribution; leave it out", **own)
     return plan, check_count("listed", listed)
 
 
