@@ -9,10 +9,8 @@ doubling by more than half a percent; at the lower end, where the motion is four
     python ex01_rattling_oscillator.py [figure.png]
 """
 
-import sys
-
 import suboctave as so
-from suboctave.pictures import plot_response
+from suboctave.pictures import figure_file, plot_response
 
 FORCE = 0.55
 GAP = 0.0
@@ -28,9 +26,8 @@ print(f"{'':4}{'exact':>12}{'smooth':>12}{'moved by':>12}")
 for a, b in zip(exact.bifurcations, smooth.bifurcations, strict=True):
     print(f"{a.kind:4}{a.omega:12.7f}{b.omega:12.7f}{b.omega - a.omega:+12.7f}")
 
-if len(sys.argv) > 1:
-    names = ["exact", f"smooth, s = {SHARPNESS:g}"]
-    plot_response([exact.to_xarray(), smooth.to_xarray()], sys.argv[1], labels=names)
+names = ["exact", f"smooth, s = {SHARPNESS:g}"]
+plot_response([exact.to_xarray(), smooth.to_xarray()], figure_file(), labels=names)
 
 # Shooting (DOP853 with located contacts, variational equations), both laws: 3.99345233 - 3.96971051.
 moved = smooth.bifurcations["PD"][0].omega - exact.bifurcations["PD"][0].omega

@@ -7,9 +7,8 @@ that of the force. The narrow tongue beyond holds two limit points.
     python ex02_tuned_absorber.py [figure.png]
 """
 
-import sys
-
 import suboctave as so
+from suboctave.pictures import figure_file
 
 FORCE = 0.11
 OMEGA = (0.9, 1.35)
@@ -21,8 +20,7 @@ for point in curve.bifurcations["NS"]:
     beat = point.omega / point.kappa
     print(f"beating begins at omega = {point.omega:.5f}, once in {beat:.1f} periods of the force")
 
-if len(sys.argv) > 1:
-    curve.plot(sys.argv[1])
+curve.plot(figure_file())
 
 # Shooting finds 1.1096015201. The system is that of Detroux, Habib, Masset, Kerschen, Mechanical Systems and Signal
 # Processing 60-61 (2015).

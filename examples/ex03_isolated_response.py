@@ -7,12 +7,10 @@ closed curve of their own. To reach it, follow one of the large motions down in 
     python ex03_isolated_response.py [figure.png]
 """
 
-import sys
-
 import numpy as np
 
 import suboctave as so
-from suboctave.pictures import plot_response
+from suboctave.pictures import figure_file, plot_response
 
 ATTACHED, DETACHED = 0.19, 0.15  # forces
 OMEGA = (0.8, 2.7)
@@ -27,8 +25,7 @@ loop = so.continue_branch(down.orbits[-1], "omega", OMEGA)
 sweep = so.frequency_response(so.library.nltva(F=DETACHED), OMEGA)
 print(loop)
 
-if len(sys.argv) > 1:
-    plot_response([sweep.to_xarray(), loop.to_xarray()], sys.argv[1], labels=["swept", "detached"])
+plot_response([sweep.to_xarray(), loop.to_xarray()], figure_file(), labels=["swept", "detached"])
 
 # The curve returns to where it began. Its right end is a limit point; shooting finds 2.3037802598.
 assert loop.closed

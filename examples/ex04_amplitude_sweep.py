@@ -8,12 +8,10 @@ both jumps within a percent of the right force, but the large motions two percen
     python ex04_amplitude_sweep.py [figure.png]
 """
 
-import sys
-
 import numpy as np
 
 import suboctave as so
-from suboctave.pictures import plot_response
+from suboctave.pictures import figure_file, plot_response
 
 DAMPING, ALPHA = 0.05, 1.0
 OMEGA = 1.5
@@ -24,8 +22,7 @@ curve = so.continue_branch(system, "F", FORCES, omega=OMEGA, max_step=0.05)
 by_hand = so.continue_branch(system, "F", FORCES, omega=OMEGA, max_step=0.05, harmonics=1)
 print(curve)
 
-if len(sys.argv) > 1:
-    plot_response([curve.to_xarray(), by_hand.to_xarray()], sys.argv[1], labels=["adaptive harmonics", "one harmonic"])
+plot_response([curve.to_xarray(), by_hand.to_xarray()], figure_file(), labels=["adaptive harmonics", "one harmonic"])
 
 # With one harmonic, y = a^2 obeys F^2 = y [(1 - omega^2 + 3/4 alpha y)^2 + (c omega)^2]. The jump up is at the fold
 # with the smaller motion, where dF^2/dy = 0. (Any textbook on nonlinear oscillations.)

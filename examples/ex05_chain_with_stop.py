@@ -7,11 +7,10 @@ with the exact contact instants and locates the same period doubling by shooting
     python ex05_chain_with_stop.py [figure.png]
 """
 
-import sys
-
 import numpy as np
 
 import suboctave as so
+from suboctave.pictures import figure_file
 
 MASSES = 10
 FORCE = 0.15
@@ -36,8 +35,7 @@ check = so.verify(doubling)
 print(check)
 assert check.agrees
 
-if len(sys.argv) > 1:
-    curve.plot(sys.argv[1])
+curve.plot(figure_file())
 
 # A curve computed by shooting alone, with no harmonics (benchmarks/chain_by_shooting.py).
 assert abs(doubling.omega - 0.4343213975) < 1e-7, doubling.omega

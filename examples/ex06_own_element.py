@@ -7,13 +7,12 @@ them against finite differences. Everything else, stability and bifurcations inc
     python ex06_own_element.py [figure.png]
 """
 
-import sys
-
 import numpy as np
 from scipy.integrate import quad
 
 import suboctave as so
 from suboctave.model import SharpSampling
+from suboctave.pictures import figure_file
 
 DAMPING = 0.02
 PARAMETERS = {"k": 1.0, "F0": 1.0, "F": 0.03}
@@ -62,8 +61,7 @@ system = so.System(1.0, DAMPING, 0.0, [spring], [so.HarmonicLoad(dof=0, amplitud
 curve = so.frequency_response(system, OMEGA)
 print(curve)
 
-if len(sys.argv) > 1:
-    curve.plot(sys.argv[1])
+curve.plot(figure_file())
 
 # Near its peak the response vibrates like the free, undamped oscillator: from conservation of energy
 # omega = 2 pi / T, T = 4 int_0^a dx / sqrt(2 V(a) - 2 V(x)), V = F0^2 / k ln cosh(k x / F0); x = a sin(s) below.

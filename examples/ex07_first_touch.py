@@ -8,12 +8,11 @@ finds it at the same place.
     python ex07_first_touch.py [figure.png]
 """
 
-import sys
-
 import numpy as np
 from scipy.optimize import brentq
 
 import suboctave as so
+from suboctave.pictures import figure_file
 
 STIFFNESS = np.array([[2.0, -1.0], [-1.0, 1.0]])
 DAMPING = 0.05 * STIFFNESS
@@ -43,8 +42,7 @@ for bifurcation in curve.bifurcations:
         print(f"{bifurcation.kind} brought about by {bifurcation.contact.label}\n{check}")
         assert check.agrees
 
-if len(sys.argv) > 1:
-    curve.plot(sys.argv[1])
+curve.plot(figure_file())
 
 # Closed form: the linear amplitude equals the gap.
 first = curve.bifurcations["grazing"][0]

@@ -9,9 +9,9 @@ the natural frequency it is unstable, and the beam swings at half the frequency 
 """
 
 import math
-import sys
 
 import suboctave as so
+from suboctave.pictures import figure_file
 
 DAMPING, PULSATION = 0.05, 0.2
 
@@ -26,8 +26,8 @@ sweep = so.continue_branch(beam.with_parameters(eps=0.01), "eps", (0.01, 0.3), o
 (tip,) = sweep.bifurcations["PD"]
 print(f"at omega = 2 rest is stable up to eps = {tip.parameters['eps']:.6f}")
 
-if len(sys.argv) > 1:
-    rest.plot(sys.argv[1])
+swinging = so.switch_branch(rest.bifurcations["PD"][0])
+so.plot({"at rest": rest, "swinging": swinging}, figure_file())
 
 # Nayfeh & Mook, Nonlinear Oscillations (1979), section 5.2: omega = 2 +- sqrt(eps^2 / 4 - c^2), the tip at eps = 2 c.
 low, high = (doubling.omega for doubling in rest.bifurcations["PD"])

@@ -9,9 +9,9 @@ up later. Between the two jumps the answer depends on the direction.
 """
 
 import math
-import sys
 
 import suboctave as so
+from suboctave.pictures import figure_file
 
 DAMPING, ALPHA, FORCE = 0.1, 1.0, 0.3
 
@@ -22,8 +22,7 @@ print(up, down, sep="\n")
 print(f"between {low / (2 * math.pi):.5f} and {high / (2 * math.pi):.5f} Hz the direction of the sweep decides")
 print(curve.to_dataframe(readings=["velocity", "rms", "phase_1", "transmissibility"]).iloc[::12, -4:].to_string())
 
-if len(sys.argv) > 1:
-    curve.plot(sys.argv[1], quantity="velocity", frequency="Hz", unit="m/s", size="single-column")
+curve.plot(figure_file(), quantity="velocity", frequency="Hz", unit="m/s", size="single-column")
 
 # One harmonic, y = a^2: F^2 = y [(1 - omega^2 + 3/4 alpha y)^2 + (c omega)^2]. At the jump down the damping force takes
 # up all of the load, c omega a = F with omega^2 = 1 + 3/4 alpha y, but for terms of order c^2. (Any textbook.)

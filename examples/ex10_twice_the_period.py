@@ -8,9 +8,8 @@ towards lower frequencies it ends in a limit point.
     python ex10_twice_the_period.py [figure.png]
 """
 
-import sys
-
 import suboctave as so
+from suboctave.pictures import figure_file
 
 oscillator = so.library.reference_oscillator(p=0.55, regularization=3000.0)
 
@@ -21,8 +20,7 @@ single = so.frequency_response(oscillator, omega=(4.2, 2.9))
 print(doubled.bifurcations)
 (fold,) = doubled.bifurcations["LP"]
 
-if len(sys.argv) > 1:
-    so.plot_phase([single.bifurcations["PD"][0], doubled.orbits[0], fold], sys.argv[1], size="double-column")
+so.plot_phase([single.bifurcations["PD"][0], doubled.orbits[0], fold], figure_file(), size="double-column")
 
 # Shooting on the same equations: the fold of the 2T motions at omega = 2.94603063, max |x| = 0.6191226 there.
 assert abs(fold.omega - 2.94603063) < 1e-7

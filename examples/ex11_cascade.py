@@ -8,9 +8,8 @@ branch that leaves is followed to where it meets its parent again, each once.
     python ex11_cascade.py [figure.png]
 """
 
-import sys
-
 import suboctave as so
+from suboctave.pictures import figure_file
 
 oscillator = so.library.reference_oscillator(p=1.7, regularization=3000.0)
 diagram = so.bifurcation_diagram(oscillator, omega=(4.5, 2.2), depth=2)
@@ -24,8 +23,7 @@ print(f"4T motions from omega = {last.omega:.8f} to {first.omega:.8f}")
 again = so.switch_branch(diagram.root.branch.bifurcations["PD"][0])
 assert [item.omega for item in again.bifurcations["PD"]] == [first.omega, last.omega]
 
-if len(sys.argv) > 1:
-    diagram.plot(sys.argv[1], xlim=(2.2, 3.8), ylim=(0.0, 1.7))
+diagram.plot(figure_file(), xlim=(2.2, 3.8), ylim=(0.0, 1.7))
 
 # Shooting on the same equations: the 2T motions double their period at omega = 3.02870285 and 2.44814534.
 assert abs(first.omega - 3.02870285) < 1e-5

@@ -7,9 +7,8 @@ plain motion never doubles its period.
     python ex12_boundaries.py [figure.png]
 """
 
-import sys
-
 import suboctave as so
+from suboctave.pictures import figure_file
 
 system = so.library.reference_oscillator(p=0.55, regularization=3000.0)
 curves = [so.frequency_response(system.with_parameters({"j": gap}), omega=(4.1, 2.0)) for gap in (0.0, 0.08, 0.16)]
@@ -20,8 +19,7 @@ folds = so.track(doubled.bifurcations["LP"][0], parameter="j", bounds=(0.0, 1.0)
 print(border)
 print(folds)
 
-if len(sys.argv) > 1:
-    so.plot_space([*curves, doubled, border, folds], sys.argv[1], size="double-column")
+so.plot_space([*curves, doubled, border, folds], figure_file(), size="double-column")
 
 # Shooting (no harmonic balance) puts the border's highest point at omega = 2.021701, j = 0.177129.
 highest = next(e for e in border.extrema if e.parameter_name == "j")

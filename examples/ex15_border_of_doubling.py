@@ -8,17 +8,15 @@ response curve from rest shows.
     python ex15_border_of_doubling.py [figure.png]
 """
 
-import sys
-
 import suboctave as so
+from suboctave.pictures import figure_file
 
 system = so.library.reference_oscillator(p=0.55, regularization=3000.0)
 response = so.frequency_response(system, omega=(4.05, 3.9))
 border = so.track(response.bifurcations["PD"][0], parameter="j", bounds=(0.0, 1.0))
 print(border)
 
-if len(sys.argv) > 1:
-    border.plot(sys.argv[1], title="Where the vibration doubles its period")
+border.plot(figure_file(), title="Where the vibration doubles its period")
 
 # Shooting (no harmonic balance) puts the extremum at omega = 2.021701, j = 0.177129.
 farthest = next(e for e in border.extrema if e.parameter_name == "j")

@@ -6,9 +6,8 @@ gaps: where the closed branch shrinks to a point, and where it merges with what 
     python ex16_isola.py [figure.png]
 """
 
-import sys
-
 import suboctave as so
+from suboctave.pictures import figure_file
 
 system = so.library.reference_oscillator(p=0.55, regularization=3000.0)
 isolas = so.find_isolas(system, omega=(1.3, 4.5), parameter="j", bounds=(0.0, 1.0))
@@ -18,8 +17,7 @@ closed = isola.at(0.5)
 print(closed.bifurcations)
 print("stable between", isola.stable_ranges(0.5))
 
-if len(sys.argv) > 1:
-    isola.plot(sys.argv[1], values=[0.2, 0.3, 0.4, 0.5, 0.55])
+isola.plot(figure_file(), values=[0.2, 0.3, 0.4, 0.5, 0.55])
 
 # Shooting (no harmonic balance) puts the two ends, and the limit points at j = 0.5, here:
 assert abs(isola.born - 0.579889) < 2e-6, isola.born

@@ -13,12 +13,12 @@ no extremum.
     python ex17_isolas_as_published.py [figure.png]
 """
 
-import sys
 from dataclasses import replace
 
 import numpy as np
 
 import suboctave as so
+from suboctave.pictures import figure_file
 
 system = so.library.reference_oscillator(p=0.55, regularization=3000.0)
 
@@ -66,13 +66,12 @@ print(isola)
 for name, item in (("cusp", cusp), ("GPD", gpd)):
     print(f"{name} of its limit points  omega = {item.omega:.6f}, j = {item.parameter('j'):.6f}")
 
-if len(sys.argv) > 1:
-    # finely, where all of this happens
-    window, gaps = (2.015, 2.04), (0.174, 0.1776)
-    doubling = so.frequency_response(system.with_parameters({"j": 0.1745}), omega=window).bifurcations["PD"][0]
-    fold = min(isola.at(0.1775).bifurcations["LP"], key=lambda item: item.omega)
-    near = [so.track(item, "j", gaps, omega=window, max_step=0.05) for item in (doubling, fold)]
-    so.plot(near, sys.argv[1], size="double-column", xlim=window, ylim=gaps, marks=["CP", "GPD", "extremum"])
+# finely, where all of this happens
+window, gaps = (2.015, 2.04), (0.174, 0.1776)
+doubling = so.frequency_response(system.with_parameters({"j": 0.1745}), omega=window).bifurcations["PD"][0]
+fold = min(isola.at(0.1775).bifurcations["LP"], key=lambda item: item.omega)
+near = [so.track(item, "j", gaps, omega=window, max_step=0.05) for item in (doubling, fold)]
+so.plot(near, figure_file(), size="double-column", xlim=window, ylim=gaps, marks=["CP", "GPD", "extremum"])
 
 # Shooting (no harmonic balance): four different points.
 for item, expected in (

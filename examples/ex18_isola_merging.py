@@ -8,10 +8,10 @@ j = 0.17713 the bubble shrinks to nothing, which the isola does not notice.
     python ex18_isola_merging.py [figure.png]
 """
 
-import sys
+from matplotlib.figure import Figure
 
 import suboctave as so
-from suboctave.pictures import View, draw_response, save_figure
+from suboctave.pictures import View, draw_response, figure_file, save_figure
 
 GAPS = (0.1740, 0.1760, 0.1768, 0.17682, 0.1769, 0.1771, 0.1772)
 RANGE = (2.1, 2.0)
@@ -36,23 +36,20 @@ for gap, response in zip(GAPS, responses, strict=True):
     if beside and gap > MERGING:  # the bubble
         assert beside[0].arrives is not None, gap
 
-if len(sys.argv) > 1:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(11.0, 5.6), layout="constrained")
-    frames = figure.subplots(2, 4, sharex=True, sharey=True).ravel()
-    view = View(xlim=WINDOW, ylim=(0.165, 0.265), marks=["LP", "PD"])
-    legend = {}
-    for axes, gap, branches in zip(frames, GAPS, drawn, strict=False):
-        curves = [branch.to_xarray() for branch in branches]
-        legend |= draw_response(axes, curves, view=view, by_period=True)
-        axes.set_title(f"j = {gap:g}")
-        axes.set_xlim(*view.xlim)
-        axes.set_ylim(*view.ylim)
-        axes.label_outer()
-    frames[-1].axis("off")
-    frames[-1].legend(legend.values(), legend.keys(), loc="center")
-    save_figure(figure, sys.argv[1], dpi=150)
+figure = Figure(figsize=(11.0, 5.6), layout="constrained")
+frames = figure.subplots(2, 4, sharex=True, sharey=True).ravel()
+view = View(marks=["LP", "PD"])
+legend = {}
+for axes, gap, branches in zip(frames, GAPS, drawn, strict=False):
+    curves = [branch.to_xarray() for branch in branches]
+    legend |= draw_response(axes, curves, view=view, by_period=True)
+    axes.set_title(f"j = {gap:g}")
+    axes.set_xlim(*WINDOW)
+    axes.set_ylim(0.165, 0.265)
+    axes.label_outer()
+frames[-1].axis("off")
+frames[-1].legend(legend.values(), legend.keys(), loc="center")
+save_figure(figure, figure_file(), dpi=150)
 
 # The doublings vanish at j = 0.177129 (shooting), 0.0003 above the merging.
 assert [len(response.bifurcations["PD"]) > 0 for response in responses] == [gap < 0.177129 for gap in GAPS]

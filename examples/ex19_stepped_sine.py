@@ -9,9 +9,9 @@ parts of the curve and falls, or jumps, where those end.
 """
 
 import math
-import sys
 
 import suboctave as so
+from suboctave.pictures import figure_file
 
 DAMPING, ALPHA, FORCE = 0.1, 1.0, 0.3
 
@@ -25,8 +25,7 @@ test = so.stepped_sine(
 print(test)
 print(test.to_dataframe().iloc[::20, :4].to_string())
 
-if len(sys.argv) > 1:
-    test.plot(sys.argv[1], curves=curve, size="double-column")
+test.plot(figure_file(), curves=curve, size="double-column")
 
 assert check.agrees, check
 # One harmonic, as in ex09: the jump down, c omega a = F with omega^2 = 1 + 3/4 alpha a^2. The test falls within one of

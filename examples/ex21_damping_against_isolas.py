@@ -7,19 +7,17 @@ any more, at any gap. Such a resonance lies on no sweep: a map of it has to be f
     python ex21_damping_against_isolas.py [figure.png]
 """
 
-import sys
-
 import suboctave as so
+from suboctave.pictures import figure_file
 
 system = so.library.reference_oscillator(regularization=3000.0)
 isolas = so.find_isolas(system, omega=(1.3, 4.5), parameter="j", bounds=(0.0, 1.0), values=[0.1])
 regions = so.isola_map(isolas, parameter="zeta", bounds=(0.02, 0.2))
 print(regions)
 
-if len(sys.argv) > 1:
-    regions.plot(
-        sys.argv[1], title="Isolated 2T resonance of the rattling oscillator", xlabel="damping ratio", ylabel="gap j"
-    )
+regions.plot(
+    figure_file(), title="Isolated 2T resonance of the rattling oscillator", xlabel="damping ratio", ylabel="gap j"
+)
 
 # Shooting (no harmonic balance) has birth and merging at these gaps for zeta = 0.03.
 ((low, high),) = regions.ranges(0.03)

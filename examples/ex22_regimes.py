@@ -8,18 +8,16 @@ states. Those that end on motions that no branch leads to are reported.
     python ex22_regimes.py [figure.png]
 """
 
-import sys
-
 import suboctave as so
+from suboctave.pictures import figure_file
 
 system = so.library.reference_oscillator(regularization=3000.0)
 regimes = so.regime_map(system, omega=(1.9, 3.3), parameter="j", bounds=(0.0, 0.7), depth=1)
 print(regimes)
-checked = regimes.check(points=30, seed=5, starts=2)
+checked = regimes.check(points=12, seed=5, starts=2)
 print(checked)
 
-if len(sys.argv) > 1:
-    regimes.plot(sys.argv[1], title="Stable motions of the rattling oscillator")
+regimes.plot(figure_file(), title="Stable motions of the rattling oscillator")
 
 # At j = 0.3 shooting (no harmonic balance) puts the limit points of the isola at these frequencies.
 for omega, inside in ((2.0824, False), (2.0826, True), (2.7856, True), (2.7858, False)):

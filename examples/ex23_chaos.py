@@ -6,9 +6,8 @@ of 1.4 in every period of the load.
     python ex23_chaos.py [figure.png]
 """
 
-import sys
-
 import suboctave as so
+from suboctave.pictures import figure_file
 
 ZETA = 0.03
 
@@ -21,8 +20,7 @@ by_two = so.lyapunov_exponents(
 )
 print(by_two)
 
-if len(sys.argv) > 1:
-    found.plot(sys.argv[1])
+found.plot(figure_file())
 
 # All exponents together are the rate at which volumes of states shrink: -2 zeta, whatever the motion (Liouville).
 assert abs(found.exponents.sum() + 2.0 * ZETA) < 1e-9

@@ -8,9 +8,8 @@ motion in between lies on their border.
     python ex24_basins.py [figure.png]
 """
 
-import sys
-
 import suboctave as so
+from suboctave.pictures import figure_file
 
 OMEGA = 1.5
 
@@ -20,8 +19,7 @@ found = so.basins(system, omega=OMEGA, box=((-2.5, 2.5), (-3.0, 3.0)), grid=(80,
 print(found)
 print(found.to_dataframe().to_string(index=False))
 
-if len(sys.argv) > 1:
-    found.plot(sys.argv[1])
+found.plot(figure_file())
 
 # Nothing but the two stable motions of the response attracts, and what was stopped early ended as foretold.
 assert len(found.attractors) == 2

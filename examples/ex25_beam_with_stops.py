@@ -8,9 +8,9 @@ down in a jump.
 """
 
 import math
-import sys
 
 import suboctave as so
+from suboctave.pictures import figure_file
 
 ELEMENTS = 20
 FORCE = 1.0  # N
@@ -44,8 +44,7 @@ print(curve)
 jump = curve.bifurcations["LP"][0]
 print(f"the resonance ends at {jump.omega / (2.0 * math.pi):.4f} Hz, without stops it lies at {modes.hertz[0]:.4f} Hz")
 
-if len(sys.argv) > 1:
-    curve.plot(sys.argv[1], frequency="Hz")
+curve.plot(figure_file(), frequency="Hz")
 
 # by shooting, with the four lowest modes and what stops and load deflect: 206.91863
 assert abs(jump.omega - 206.91863) < 1e-4, jump.omega

@@ -8,9 +8,8 @@ far the stop must be moved away so that no doubling is left.
     python ex26_plate_with_stops.py [figure.png]
 """
 
-import sys
-
 import suboctave as so
+from suboctave.pictures import figure_file
 
 # no units: mass and first natural frequency are 1
 system = so.structures.clearance_plate(nx=20, ny=12, stops=1, Kc=1.0, gap=0.1, p=0.2)
@@ -28,8 +27,7 @@ print(border)
 farthest = next(event for event in border.extrema if event.parameter_name == "gap")
 print(f"no vibration doubles its period beyond the gap {farthest.parameter('gap'):.5f} (omega = {farthest.omega:.4f})")
 
-if len(sys.argv) > 1:
-    so.plot([response, doubled], sys.argv[1], labels=["T", "2T"])
+so.plot([response, doubled], figure_file(), labels=["T", "2T"])
 
 # by shooting, with the fourteen lowest modes and what stop and load deflect: 2.29943
 assert abs(doubling.omega - 2.29943) < 5e-5, doubling.omega

@@ -7,9 +7,8 @@ which it is gone.
     python ex27_how_far_from_an_isola.py [figure.png]
 """
 
-import sys
-
 import suboctave as so
+from suboctave.pictures import figure_file
 
 system = so.library.reference_oscillator(p=0.55, j=0.5)
 where = {"omega": (1.3, 4.5), "parameter": "j", "bounds": (0.0, 1.0), "harmonics": 15, "values": 2}
@@ -24,8 +23,7 @@ together = so.design_margin(isola, by=["zeta", "Kc", "p"])
 print(margin)
 print(together)
 
-if len(sys.argv) > 1:
-    isola.plot(sys.argv[1], values=[0.3, 0.5])
+isola.plot(figure_file(), values=[0.3, 0.5])
 
 # Shooting (no harmonic balance) puts the birth at this gap.
 assert abs(isola.born - 0.581107) < 2e-6, isola.born

@@ -7,11 +7,10 @@ mode takes part at twice the frequency.
     python ex28_nonlinear_mode.py [figure.png]
 """
 
-import sys
-
 import numpy as np
 
 import suboctave as so
+from suboctave.pictures import figure_file
 
 system = so.System(np.eye(2), np.zeros((2, 2)), [[2.0, -1.0], [-1.0, 2.0]], elements=[so.CubicSpring(0, 0.5)])
 mode = so.nonlinear_mode(system, mode=1, amplitude=(0.01, 5.0))
@@ -20,8 +19,7 @@ print(mode)
 tongue = so.switch_branch(crossing, bounds=(1.2, 1.39))
 print(tongue)
 
-if len(sys.argv) > 1:
-    so.plot([mode, tongue], sys.argv[1], labels=["lower mode", "2:1 tongue"], quantity="energy")
+so.plot([mode, tongue], figure_file(), labels=["lower mode", "2:1 tongue"], quantity="energy")
 
 # Shooting (no harmonic balance) puts the branch point at this frequency.
 assert abs(crossing.omega - 1.281534) < 2e-6, crossing.omega

@@ -11,11 +11,10 @@ border of flutter that a designer needs is that of the limit point, here over th
     python ex29_flutter.py [figure.png]
 """
 
-import sys
-
 import numpy as np
 
 import suboctave as so
+from suboctave.pictures import figure_file
 
 wing = so.System.from_equations(
     [
@@ -39,8 +38,7 @@ for zeta in (0.005, 0.01, 0.02):
     ends = [float(np.interp(zeta, curve.parameter("zeta"), curve.parameter("U"))) for curve in (onset, border)]
     print(f"{zeta:7.3f}{ends[0]:17.4f}{ends[1]:22.4f}")
 
-if len(sys.argv) > 1:
-    so.plot([rest, cycles], sys.argv[1], x="U", size="double-column")
+so.plot([rest, cycles], figure_file(), x="U", size="double-column")
 
 # By shooting with free period, a second multiplier of the cycle at the limit point is +1; rest by its eigenvalues.
 assert abs(hopf.parameters["U"] - 1.4132680) < 1e-6

@@ -8,11 +8,10 @@ phase resonance, and its peaks.
     python ex30_highest_peak.py [figure.png]
 """
 
-import sys
-
 import numpy as np
 
 import suboctave as so
+from suboctave.pictures import figure_file
 
 m, f = 0.05, 1.0 / 1.05  # mass of the absorber, and its frequency as den Hartog tunes it
 absorber = so.System(
@@ -35,9 +34,8 @@ peaks = so.track_peak(curve, "F", (0.01, 0.3))
 ends = [float(np.interp(0.2, one.parameter("F"), one.amplitude)) for one in (backbone, peaks)]
 print(f"F = 0.2: in quadrature {ends[0]:.5f}, highest {ends[1]:.5f}")
 
-if len(sys.argv) > 1:
-    labels = ["response", "in quadrature", "highest"]
-    so.plot([curve, backbone, peaks], sys.argv[1], x="omega", labels=labels, size="double-column")
+labels = ["response", "in quadrature", "highest"]
+so.plot([curve, backbone, peaks], figure_file(), x="omega", labels=labels, size="double-column")
 
 # den Hartog: of this tuning the peaks are lowest where they are as high as the points that all responses pass.
 assert abs(lowest.amplitude - np.sqrt(1.0 + 2.0 / m)) < 1e-6

@@ -12,12 +12,14 @@ import sys
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 from scipy.stats import binomtest, norm
 
 import suboctave as so
+from suboctave.pictures import figure_file
 
 arguments = sys.argv[1:]
-draws = 8  # for an interval of 0.06 it takes 1000, and half an hour on two cores
+draws = 2  # for an interval of 0.06 it takes 1000, and half an hour on two cores
 if "--draws" in arguments:
     place = arguments.index("--draws")
     draws = int(arguments[place + 1])
@@ -33,7 +35,7 @@ print(f"{there.sum()} of {draws} oscillators have the isola: between {interval.l
 
 # The birth of the isola over the gap, followed over the stiffness.
 system = so.library.reference_oscillator(p=load, j=0.58, Kc=4.7)
-(isola,) = so.find_isolas(system, (2.1, 2.6), "j", (0.5, 0.65), harmonics=7, values=2)
+(isola,) = so.find_isolas(system, (2.1, 2.6), "j", (0.57, 0.59), harmonics=7, values=2)
 births = so.track(isola.born, "Kc", (4.5, 4.9), max_step=0.05)
 order = np.argsort(births.parameter("Kc"))
 stiffness, gap = births.parameter("Kc")[order], births.parameter("j")[order]
@@ -41,17 +43,14 @@ share = norm.cdf(gap, 0.58, 0.015)
 probability = float(np.sum(np.diff(stiffness) * 0.5 * (share[1:] + share[:-1])) / 0.4)
 print(f"probability by the curve of births: {probability:.4f}")
 
-if arguments:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(5.2, 3.6), layout="constrained")
-    axes = figure.subplots()
-    axes.plot(stiffness, gap, color="black", label="births of the isola")
-    axes.plot(sweep["Kc"][there], sweep["j"][there], "o", label="isola")
-    axes.plot(sweep["Kc"][~there], sweep["j"][~there], "o", mfc="none", label="none")
-    axes.set(xlabel="contact stiffness Kc", ylabel="gap j", title=f"P = {interval.low:.2f} to {interval.high:.2f}")
-    axes.legend()
-    figure.savefig(arguments[0], dpi=150)
+figure = Figure(figsize=(5.2, 3.6), layout="constrained")
+axes = figure.subplots()
+axes.plot(stiffness, gap, color="black", label="births of the isola")
+axes.plot(sweep["Kc"][there], sweep["j"][there], "o", label="isola")
+axes.plot(sweep["Kc"][~there], sweep["j"][~there], "o", mfc="none", label="none")
+axes.set(xlabel="contact stiffness Kc", ylabel="gap j", title=f"P = {interval.low:.2f} to {interval.high:.2f}")
+axes.legend()
+figure.savefig(figure_file(), dpi=150)
 
 # Each draw has the isola if and only if its gap lies below the curve of births.
 assert np.array_equal(there, sweep["j"] < np.interp(sweep["Kc"], stiffness, gap))

@@ -8,11 +8,10 @@ point, below which the pattern never comes about.
     python ex32_equal_blades.py [figure.png]
 """
 
-import sys
-
 import numpy as np
 
 import suboctave as so
+from suboctave.pictures import figure_file
 
 BLADES, COUPLING = 6, 0.01
 ring = 2 * np.eye(BLADES) - np.roll(np.eye(BLADES), 1, axis=0) - np.roll(np.eye(BLADES), -1, axis=0)
@@ -36,9 +35,8 @@ for diameters, (event, border) in enumerate(zip(doublings, borders, strict=True)
     lowest = min(extremum.parameters["p"] for extremum in border.extrema if extremum.parameter_name == "p")
     print(f"{diameters:>15}{event.multiplicity:>32}{lowest:>15.5f}")
 
-if len(sys.argv) > 1:
-    labels = [f"{diameters} nodal diameters" for diameters in range(len(borders))]
-    so.plot(borders, sys.argv[1], labels=labels, marks=["extremum"], size="double-column")
+labels = [f"{diameters} nodal diameters" for diameters in range(len(borders))]
+so.plot(borders, figure_file(), labels=labels, marks=["extremum"], size="double-column")
 
 # One mass alone has the tongue of all blades together, with its stiffness raised by the coupling's eigenvalue.
 assert [event.multiplicity for event in response.bifurcations] == [1, 2, 2, 2, 2, 1]

@@ -63,7 +63,7 @@ def _run(script: Path, package: str) -> tuple[Path, str, str]:
     folders = [str(DOCS.parent / "src"), os.environ.get("PYTHONPATH", "")]
     threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
     changes = {"MPLBACKEND": "Agg", "PYTHONPATH": os.pathsep.join(filter(None, folders)), **threads}
-    command = [sys.executable, str(script), str(figure)]
+    command = [sys.executable, str(script)]  # the figure has the script's name
     try:
         done = subprocess.run(
             command, capture_output=True, text=True, env=os.environ | changes, cwd=KEPT, timeout=TIME_LIMIT, check=False

@@ -6,9 +6,8 @@ between two frequencies; the branch of twice the period has two limit points and
     python fig06_weak_forcing.py [figure.png]
 """
 
-import sys
-
 import suboctave as so
+from suboctave.pictures import figure_file
 
 symmetric, asymmetric = (so.library.reference_oscillator(p=0.55, j=j, regularization=3000.0) for j in (1.0, 0.0))
 equal = so.frequency_response(symmetric, omega=(4.2, 1.25))
@@ -17,8 +16,7 @@ plain, doubled = closed["T"].branch, closed["2T"].branch
 for curve in (equal, plain, doubled):
     print(curve.bifurcations)
 
-if len(sys.argv) > 1:
-    so.plot([equal, plain, doubled], sys.argv[1], size="double-column", marks=["LP", "PD"])
+so.plot([equal, plain, doubled], figure_file(), size="double-column", marks=["LP", "PD"])
 
 # Shooting (no harmonic balance).
 assert abs(equal.bifurcations["LP"][1].omega - 2.42383602) < 1e-6

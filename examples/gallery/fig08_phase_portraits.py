@@ -5,11 +5,10 @@ A, just below that doubling, closes after one period of the load. B, just above 
     python fig08_phase_portraits.py [figure.png]
 """
 
-import sys
-
 import numpy as np
 
 import suboctave as so
+from suboctave.pictures import figure_file
 
 oscillator = so.library.reference_oscillator(p=1.7, regularization=3000.0)
 response = so.frequency_response(oscillator, omega=(4.2, 2.2))
@@ -19,8 +18,7 @@ a = response.orbits[int(np.argmin(abs(response.omega - (last.omega - 0.06))))]
 b = doubled.orbits[int(np.argmin(abs(doubled.omega - (last.omega + 0.04))))]
 print(f"doubling at omega = {last.omega:.6f}; A {a}, B {b}")
 
-if len(sys.argv) > 1:
-    so.plot_phase([a, b], sys.argv[1], size="double-column")
+so.plot_phase([a, b], figure_file(), size="double-column")
 
 # Shooting: the doubling, and both motions are what they seem, stable motions of one and of two load periods.
 assert abs(last.omega - 2.39144003) < 1e-6

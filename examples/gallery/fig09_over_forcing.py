@@ -6,9 +6,8 @@ point.
     python fig09_over_forcing.py [plane.png [space.png]]
 """
 
-import sys
-
 import suboctave as so
+from suboctave.pictures import figure_file
 
 FORCING = (0.05, 2.0)
 
@@ -21,17 +20,15 @@ lowest = min((e for e in second.extrema if e.parameter_name == "p"), key=lambda 
 for curve in (*first, second):
     print(curve)
 
-if len(sys.argv) > 1:
-    figure = so.plot([*first, second], size="double-column", xlim=(2.1, 4.4), ylim=(0.0, 2.0))
-    for x, p, name in ((2.2, 0.9, "T"), (4.2, 0.9, "T"), (3.1, 0.6, "2T"), (2.8, 1.75, "4T and longer")):
-        figure.axes[0].text(x, p, name, ha="center", fontsize=8)
-    figure.axes[0].plot(2.6, 1.6, "k+")
-    figure.axes[0].text(2.62, 1.55, "B", fontsize=8)
-    figure.savefig(sys.argv[1], dpi=300)
-if len(sys.argv) > 2:
-    systems = [oscillator.with_parameters({"p": p}) for p in (0.5, 1.0, 1.5, 2.0)]
-    diagrams = [so.bifurcation_diagram(system, omega=(4.4, 2.25)) for system in systems]
-    so.plot_space([*diagrams, *first, second], sys.argv[2], size="double-column")
+figure = so.plot([*first, second], size="double-column", xlim=(2.1, 4.4), ylim=(0.0, 2.0))
+for x, p, name in ((2.2, 0.9, "T"), (4.2, 0.9, "T"), (3.1, 0.6, "2T"), (2.8, 1.75, "4T and longer")):
+    figure.axes[0].text(x, p, name, ha="center", fontsize=8)
+figure.axes[0].plot(2.6, 1.6, "k+")
+figure.axes[0].text(2.62, 1.55, "B", fontsize=8)
+figure.savefig(figure_file(), dpi=300)
+systems = [oscillator.with_parameters({"p": p}) for p in (0.5, 1.0, 1.5, 2.0)]
+diagrams = [so.bifurcation_diagram(system, omega=(4.4, 2.25)) for system in systems]
+so.plot_space([*diagrams, *first, second], figure_file(2), size="double-column")
 
 # Shooting (no harmonic balance): the lowest point of the second curve. The first one spans all of the range.
 assert abs(lowest.omega - 2.81934917) < 1e-5

@@ -6,9 +6,8 @@ far above.
     python fig10_over_stiffness.py [plane.png [space.png]]
 """
 
-import sys
-
 import suboctave as so
+from suboctave.pictures import figure_file
 
 STIFFNESS = (0.0, 6.0)
 
@@ -21,17 +20,15 @@ lowest = [next(e for e in curve.extrema if e.parameter_name == "Kc") for curve i
 for curve in (first, second):
     print(curve)
 
-if len(sys.argv) > 1:
-    figure = so.plot([first, second], size="double-column", ylim=(0.0, 6.0))
-    for x, stiffness, name in ((2.1, 4.0, "T"), (3.8, 2.4, "T"), (2.7, 1.7, "2T"), (2.75, 5.0, "4T and longer")):
-        figure.axes[0].text(x, stiffness, name, ha="center", fontsize=8)
-    figure.axes[0].plot(2.6, 4.2, "k+")
-    figure.axes[0].text(2.62, 4.1, "B", fontsize=8)
-    figure.savefig(sys.argv[1], dpi=300)
-if len(sys.argv) > 2:
-    systems = [oscillator.with_parameters({"Kc": stiffness}) for stiffness in (2.0, 3.0, 4.5, 6.0)]
-    diagrams = [so.bifurcation_diagram(system, omega=(4.4, 2.22)) for system in systems]
-    so.plot_space([*diagrams, first, second], sys.argv[2], size="double-column")
+figure = so.plot([first, second], size="double-column", ylim=(0.0, 6.0))
+for x, stiffness, name in ((2.1, 4.0, "T"), (3.8, 2.4, "T"), (2.7, 1.7, "2T"), (2.75, 5.0, "4T and longer")):
+    figure.axes[0].text(x, stiffness, name, ha="center", fontsize=8)
+figure.axes[0].plot(2.6, 4.2, "k+")
+figure.axes[0].text(2.62, 4.1, "B", fontsize=8)
+figure.savefig(figure_file(), dpi=300)
+systems = [oscillator.with_parameters({"Kc": stiffness}) for stiffness in (2.0, 3.0, 4.5, 6.0)]
+diagrams = [so.bifurcation_diagram(system, omega=(4.4, 2.22)) for system in systems]
+so.plot_space([*diagrams, first, second], figure_file(2), size="double-column")
 
 # Shooting (no harmonic balance).
 for found, expected in zip(lowest, ((2.15720393, 0.22363402), (2.520651, 2.92809977)), strict=True):

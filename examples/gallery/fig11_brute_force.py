@@ -6,11 +6,10 @@ they settle on is shown.
     python fig11_brute_force.py [figure.png]
 """
 
-import sys
-
 import numpy as np
 
 import suboctave as so
+from suboctave.pictures import figure_file
 
 oscillator = so.library.reference_oscillator(p=1.6, Kc=4.2, j=0.0, regularization=3000.0)
 scan = so.brute_force_diagram(
@@ -24,12 +23,11 @@ twice = so.switch_branch(max(response.bifurcations["PD"], key=lambda b: b.omega)
 print(response.bifurcations, twice.bifurcations, sep="\n")
 first, second = (sorted(b.omega for b in branch.bifurcations["PD"]) for branch in (response, twice))
 
-if len(sys.argv) > 1:
-    figure = scan.plot(quantity="section", starts=["down"], size="double-column")
-    for doublings, colour in ((first, "#0072B2"), (second, "#E69F00")):
-        for omega in doublings:
-            figure.axes[0].axvline(omega, color=colour, linewidth=0.8, linestyle="--", zorder=1)
-    figure.savefig(sys.argv[1], dpi=300)
+figure = scan.plot(quantity="section", starts=["down"], size="double-column")
+for doublings, colour in ((first, "#0072B2"), (second, "#E69F00")):
+    for omega in doublings:
+        figure.axes[0].axvline(omega, color=colour, linewidth=0.8, linestyle="--", zorder=1)
+figure.savefig(figure_file(), dpi=300)
 
 assert np.allclose(first, (2.36665, 3.84298), rtol=0.0, atol=2e-5), first
 assert np.allclose(second, (2.44243, 2.89524), rtol=0.0, atol=2e-5), second

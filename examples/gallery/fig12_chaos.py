@@ -5,11 +5,10 @@ The largest Lyapunov exponent over frequency and forcing, with the border of 4T 
     python fig12_chaos.py [figure.png]
 """
 
-import sys
-
 import numpy as np
 
 import suboctave as so
+from suboctave.pictures import figure_file
 
 oscillator = so.library.reference_oscillator(p=1.7, regularization=3000.0)
 response = so.frequency_response(oscillator, omega=(4.2, 2.2))
@@ -18,8 +17,7 @@ second = so.track(doubled.bifurcations["PD"][0], "p", (0.9, 2.0), max_step=0.02)
 chart = so.lyapunov_map(oscillator, (2.2, 3.2), parameter="p", bounds=(0.9, 2.0), grid=(50, 34))
 print(chart)
 
-if len(sys.argv) > 1:
-    chart.plot(sys.argv[1], curves=second, size="double-column")
+chart.plot(figure_file(), curves=second, size="double-column")
 
 # Point B of the paper's section 5.1 is chaotic, here with Kc = 4.7, too; far from the border next to nothing is: few
 # motions from rest reach what is chaotic there beside the periodic ones.

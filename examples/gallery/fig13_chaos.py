@@ -3,11 +3,10 @@
 python fig13_chaos.py [figure.png]
 """
 
-import sys
-
 import numpy as np
 
 import suboctave as so
+from suboctave.pictures import figure_file
 
 oscillator = so.library.reference_oscillator(p=1.6, Kc=4.2, j=0.0, regularization=3000.0)
 accurate, newmark = (
@@ -16,8 +15,7 @@ accurate, newmark = (
 )
 print(accurate, newmark, sep="\n")
 
-if len(sys.argv) > 1:
-    accurate.plot(sys.argv[1], size=(5.2, 4.2))
+accurate.plot(figure_file(), size=(5.2, 4.2))
 
 # Nothing repeats within 1600 periods. Two integrators, whose trajectories part within some tens of periods, fill the
 # same set: the same shares of their points lie in the cells of a grid, as far as 5000 points can tell.

@@ -6,11 +6,10 @@ done with a hundred step sizes, and the exponent is computed by the derivative o
     python fig14_exponent.py [figure.png]
 """
 
-import sys
-
 import numpy as np
 
 import suboctave as so
+from suboctave.pictures import figure_file
 
 oscillator = so.library.reference_oscillator(p=1.6, Kc=4.2, j=0.0, regularization=3000.0)
 by_two = so.lyapunov_exponents(oscillator, omega=2.6, method="two_trajectories")
@@ -19,8 +18,7 @@ print(by_two)
 print(exponents)
 print(f"runs that give the paper's 0.1918 or more: {np.mean(by_two.rates >= 0.1918):.0%}")
 
-if len(sys.argv) > 1:
-    by_two.plot(sys.argv[1], size="double-column")
+by_two.plot(figure_file(), size="double-column")
 
 # 0.136 +- 0.0003 by variational equations in another program, 0.131 with a standard deviation of 0.018 by two
 # trajectories with 200 step sizes of Newmark's method there.

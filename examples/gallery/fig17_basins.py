@@ -5,17 +5,15 @@ j = 0.5, 200 x 200 states. The small motion without contact, the 2T motion on th
     python fig17_basins.py [figure.png]
 """
 
-import sys
-
 import suboctave as so
+from suboctave.pictures import figure_file
 
 oscillator = so.library.reference_oscillator(p=0.55, j=0.5, regularization=3000.0)
 found = so.basins(oscillator, omega=2.25, box=((-2.0, 2.0), (-2.0, 2.0)))
 print(found)
 print(found.to_dataframe().to_string(index=False))
 
-if len(sys.argv) > 1:
-    found.plot(sys.argv[1], size=(6.85, 6.4))
+found.plot(figure_file(), size=(6.85, 6.4))
 
 # Shares and largest displacements by Newmark's method over many periods in another program.
 shares = {round(one.amplitude, 5): found.shares[one.name] for one in found.attractors}

@@ -5,11 +5,10 @@ No sweep meets the isola. At omega = 2.25 three stable motions coexist.
     python fig18_isola.py [figure.png]
 """
 
-import sys
-
 import numpy as np
 
 import suboctave as so
+from suboctave.pictures import figure_file
 
 oscillator = so.library.reference_oscillator(p=0.55, j=0.5, regularization=3000.0)
 response = so.frequency_response(oscillator, omega=(3.0, 1.3))
@@ -19,8 +18,7 @@ print(response.bifurcations)
 print(loop.bifurcations)
 print(f"stable motions on the isola for omega in {isola.stable_ranges(0.5)}")
 
-if len(sys.argv) > 1:
-    so.plot([response, loop], sys.argv[1], size="double-column", marks=["LP", "PD"])
+so.plot([response, loop], figure_file(), size="double-column", marks=["LP", "PD"])
 
 # Shooting (no harmonic balance): the ends of the isola and of the bistable range of the response.
 for branch, expected in ((loop, (2.200149, 2.514902)), (response, (1.443072, 2.481901))):

@@ -6,11 +6,10 @@ frequency of the load. The large motion has the load's period.
     python fig19_spectra.py [figure.png]
 """
 
-import sys
-
 import numpy as np
 
 import suboctave as so
+from suboctave.pictures import figure_file
 
 OMEGA = 2.25
 
@@ -27,8 +26,7 @@ for orbit in (small, medium, large):
     ]
     print(f"max |x| = {orbit.amplitude():.5f}  {', '.join(parts)}")
 
-if len(sys.argv) > 1:
-    so.plot_spectrum([small, medium, large], sys.argv[1], size=(6.85, 4.4), highest=6)
+so.plot_spectrum([small, medium, large], figure_file(), size=(6.85, 4.4), highest=6)
 
 # Shooting (no harmonic balance): the largest |x| of the two motions that touch the stops.
 assert abs(medium.amplitude() - 0.88906) < 1e-5

@@ -6,11 +6,10 @@ Frequencies are stepped up from 2.0 and down from 2.7 on the small motion. At om
     python fig20_stepped_sine.py [figure.png]
 """
 
-import sys
-
 import numpy as np
 
 import suboctave as so
+from suboctave.pictures import figure_file
 
 oscillator = so.library.reference_oscillator(p=0.55, j=0.5, regularization=3000.0)
 response = so.frequency_response(oscillator, omega=(2.9, 1.9))
@@ -22,8 +21,7 @@ print(plain, tapped, sep="\n")
 (isola,) = so.find_isolas(oscillator, omega=(1.9, 4.2), parameter="j", bounds=(0.3, 0.7), values=[0.5])
 loop = isola.at(0.5)
 
-if len(sys.argv) > 1:
-    tapped.plot(sys.argv[1], curves=[response, loop], size="double-column", ylim=(0.05, 0.2))
+tapped.plot(figure_file(), curves=[response, loop], size="double-column", ylim=(0.05, 0.2))
 
 # Shooting (no harmonic balance): the ends of the isola. Motions of twice the period are met up to the last step inside.
 LOW, HIGH = 2.200149, 2.514902

@@ -6,11 +6,10 @@ isola.
     python fig21_histories.py [figure.png]
 """
 
-import sys
-
 import numpy as np
 
 import suboctave as so
+from suboctave.pictures import figure_file
 
 OMEGA = 2.25
 
@@ -21,8 +20,7 @@ loop = isola.at(0.5)
 near = loop.orbits[int(np.argmin(np.where(loop.stable, abs(loop.omega - OMEGA), np.inf)))]
 isolated = so.continue_branch(near, "omega", (near.omega, OMEGA)).orbits[-1]
 
-if len(sys.argv) > 1:
-    so.plot_history([swept, isolated], sys.argv[1], size="double-column", overlay=True)
+so.plot_history([swept, isolated], figure_file(), size="double-column", overlay=True)
 
 # Shooting (no harmonic balance) from the same states arrives at both; the amplitude on the isola.
 for orbit in (swept, isolated):

@@ -35,6 +35,9 @@ class Motion:
         """
         return answer("plot")(self, path, options)
 
+    def _repr_html_(self) -> str:
+        return str(answer("cell")(self))
+
     def spectrum(self, dof: GivenDof | None = None) -> pandas.DataFrame:
         """Its components, one row each: `harmonic` (multiple of omega), `omega`, `hertz`, `amplitude` and `phase`.
 

@@ -1,5 +1,5 @@
 """Every example runs from top to bottom, its assertion holds, what it computes lists the events that are recorded of
-it, and it draws its figure only when told where."""
+it, and its figure is written, without texts that lie on each other."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from event_tables import against_recorded, recording
+from overlaps import overlapping_texts, written_figures
 
 FOLDER = Path(__file__).parents[2] / "examples"
 SCRIPTS = sorted(FOLDER.glob("ex*.py"))
@@ -40,21 +41,15 @@ NEEDS = {"ex26_plate_with_stops": "skfem"}
     [pytest.param(path, marks=[pytest.mark.slow] if path.stem in LONG else []) for path in SCRIPTS],
     ids=lambda path: path.stem,
 )
-def test_example(script, tmp_path, monkeypatch):
+def test_example(script, tmp_path, monkeypatch, capsys):
     if script.stem in NEEDS:
         pytest.importorskip(NEEDS[script.stem])
     monkeypatch.setenv("MPLBACKEND", "Agg")
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "argv", [str(script), "figure.png"])
-    with recording() as tables:
+    monkeypatch.setattr(sys, "argv", [str(script)])
+    with recording() as tables, written_figures() as figures:
         runpy.run_path(str(script), run_name="__main__")
     assert not against_recorded(script.stem, tables)
-    assert [path.name for path in tmp_path.iterdir()] == ["figure.png"]
-
-
-def test_without_a_path_nothing_is_written(tmp_path, monkeypatch):
-    script = FOLDER / "ex02_tuned_absorber.py"
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "argv", [str(script)])
-    runpy.run_path(str(script), run_name="__main__")
-    assert not list(tmp_path.iterdir())
+    assert [path.name for path in tmp_path.iterdir()] == [f"{script.stem}.png"]
+    assert f"figure: {script.stem}.png" in capsys.readouterr().out
+    assert [overlapping_texts(figure) for figure in figures] == [[]]

@@ -1,5 +1,5 @@
 """Every figure of the gallery runs from top to bottom, its assertion holds, what it computes lists the events that are
-recorded of it, and it draws only when told where."""
+recorded of it, and no texts of its figures lie on each other."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from event_tables import against_recorded, recording
+from overlaps import overlapping_texts, written_figures
 
 FOLDER = Path(__file__).parents[2] / "examples" / "gallery"
 SCRIPTS = sorted(FOLDER.glob("fig*.py"))
@@ -36,13 +37,14 @@ def test_figure(script, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     several = "space.png]" in script.read_text()
     names = ["figure.png", "space.png"] if several else ["figure.png"]
-    with recording() as tables:
+    with recording() as tables, written_figures() as figures:
         run(script, names, monkeypatch)
+    assert [overlapping_texts(figure) for figure in figures] == [[] for _ in names]
     assert not against_recorded(script.stem, tables)
     assert sorted(path.name for path in tmp_path.iterdir()) == names
 
 
-def test_without_a_path_nothing_is_written(tmp_path, monkeypatch):
+def test_without_a_path_the_figure_has_the_name_of_the_script(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     run(FOLDER / "fig08_phase_portraits.py", [], monkeypatch)
-    assert not list(tmp_path.iterdir())
+    assert [path.name for path in tmp_path.iterdir()] == ["fig08_phase_portraits.png"]

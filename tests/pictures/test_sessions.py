@@ -98,7 +98,11 @@ def test_results_in_a_notebook_are_their_picture_and_what_they_print(curve):
     html = curve._repr_html_()
     assert html.startswith("<img")
     assert "data:image/svg+xml;base64," in html
-    assert html.endswith(f"<pre>{escape(repr(curve))}</pre>")
+    assert html.endswith(f">{escape(repr(curve))}</pre>")
+    assert "monospace" in html
+    for motion in (curve[3], curve[3].orbit):
+        assert motion._repr_html_().startswith("<img")
+        assert motion._repr_html_().endswith(f">{escape(repr(motion))}</pre>")
 
 
 def test_a_plane_and_a_motion_in_time_have_pictures_too(curve):

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from itertools import combinations
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 #: pixels by which boxes may meet: letters do not fill theirs
@@ -38,3 +40,19 @@ def _unseen_ticks(figure):
                 if id(tick) not in drawn:
                     hidden |= {id(tick.label1), id(tick.label2)}
     return hidden
+
+
+@contextmanager
+def written_figures():
+    """The figures that are written meanwhile, [figure, ...]."""
+    figures, save = [], Figure.savefig
+
+    def saved(figure, *given, **options):
+        figures.append(figure)
+        return save(figure, *given, **options)
+
+    Figure.savefig = saved
+    try:
+        yield figures
+    finally:
+        Figure.savefig = save

@@ -8,7 +8,7 @@ plot(curve.to_xarray(), "curve.png")
 from suboctave.pictures.boundary import plot_boundaries, plot_space
 from suboctave.pictures.motions import plot_history, plot_phase, plot_spectrum
 from suboctave.pictures.options import View
-from suboctave.pictures.paper import save_figure
+from suboctave.pictures.paper import figure_file, save_figure
 from suboctave.pictures.report import write_report
 from suboctave.pictures.response import draw_response, plot, plot_panels, plot_response
 from suboctave.pictures.shapes import animate_shape, plot_shape
@@ -18,6 +18,7 @@ __all__ = [
     "View",
     "animate_shape",
     "draw_response",
+    "figure_file",
     "plot",
     "plot_boundaries",
     "plot_history",

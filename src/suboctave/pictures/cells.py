@@ -9,6 +9,11 @@ from typing import Any
 
 from suboctave.errors import InputError
 
+#: tables stay tables: no proportional letters, no wrapped lines
+_LETTERS = (
+    "font-family: ui-monospace, Menlo, Consolas, 'DejaVu Sans Mono', monospace; white-space: pre; overflow-x: auto"
+)
+
 
 class Pictured(ABC):
     """What is drawn by `plot()` and printed by `repr`: a notebook shows both."""
@@ -18,11 +23,16 @@ class Pictured(ABC):
         """Its picture, saved where a path is given."""
 
     def _repr_html_(self) -> str:
-        from suboctave.pictures.paper import image_of
+        return cell_of(self)
 
-        words = f"<pre>{escape(repr(self))}</pre>"
-        try:
-            picture = base64.b64encode(image_of(self.plot(), "svg")).decode("ascii")
-        except InputError:  # a curve without points
-            return words
-        return f'<img alt="" style="max-width: 44em; width: 100%" src="data:image/svg+xml;base64,{picture}">{words}'
+
+def cell_of(item: Any) -> str:
+    """What a notebook shows of an item: its picture, and below it in letters of one width what it prints."""
+    from suboctave.pictures.paper import image_of
+
+    words = f'<pre style="{_LETTERS}">{escape(repr(item))}</pre>'
+    try:
+        picture = base64.b64encode(image_of(item.plot(), "svg")).decode("ascii")
+    except InputError:  # a curve without points
+        return words
+    return f'<img alt="" style="max-width: 44em; width: 100%" src="data:image/svg+xml;base64,{picture}">{words}'

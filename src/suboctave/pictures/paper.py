@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import io
 import math
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial, wraps
@@ -511,6 +512,18 @@ def save_figure(figure: Figure, path: str | Path, *, dpi: float = 300.0) -> Path
     finally:
         figure.set_layout_engine(arranged)
     return target
+
+
+def figure_file(number: int = 1) -> Path:
+    """Where a script puts its figure, or the second, the third: the file of that number on its command line, else one
+    of its own name, with .png, in the folder that it runs in. Prints which.
+    """
+    named = [text for text in sys.argv[1:] if Path(text).suffix.lower() in SUFFIXES]
+    script = Path(sys.argv[0]).stem or "figure"
+    own = f"{script}.png" if number == 1 else f"{script}_{number}.png"
+    path = path_of(named[number - 1] if len(named) >= number else own)
+    print(f"figure: {path}")
+    return path
 
 
 def image_of(figure: Figure, form: str, **options: Any) -> bytes:

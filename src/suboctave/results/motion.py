@@ -64,6 +64,13 @@ def plot(motion: Any, path: Any, options: Mapping[str, Any]) -> Any:
     return plot_history(motion, path, **options)
 
 
+def cell(motion: Any) -> str:
+    """What a notebook shows of it."""
+    from suboctave.pictures.cells import cell_of
+
+    return cell_of(motion)
+
+
 def spectrum(motion: Any, dof: GivenDof | None) -> pandas.DataFrame:
     """See `Motion.spectrum`."""
     import pandas as pd
