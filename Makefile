@@ -5,13 +5,17 @@
 # make docs      the documentation as a site, docs/_build/html; runs the examples (some minutes the first time)
 # make clean     remove the environment and everything generated
 #
-# Needs Python (3.11 or newer) and make. Everything is installed into .venv of this folder.
+# Needs Python (3.11 or newer) and make. Everything is installed into .venv of this folder: by `make demo` what a user
+# needs, by `make test` and `make docs` what developers need besides.
 # Another interpreter: make PYTHON=/path/to/python ...
 
 SHELL := /bin/sh
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+DEVELOPERS := $(VENV)/.developers
+# What is installed is compiled by Python module by module when it is first imported, most of it never.
+INSTALL := $(BIN)/python -m pip install --disable-pip-version-check --no-compile --editable
 DEMO := demo
 
 # One BLAS thread: the matrices are small, and threads that wait for each other cost more than they give.
@@ -36,16 +40,17 @@ test: lint
 test-all: lint
 	@$(BIN)/python -m pytest $(TOGETHER)
 
-lint: $(STAMP)
+lint: $(DEVELOPERS)
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check .
 	@$(BIN)/mypy
 
 docs: $(VENV)/.docs
-	@$(BIN)/python -m sphinx -b html -d docs/_build/doctrees -W --keep-going -n -q docs docs/_build/html
+	@echo "Running the examples and writing the site: some minutes the first time, then what has changed ..."
+	@$(BIN)/python -m sphinx -b html -d docs/_build/doctrees -W --keep-going -n docs docs/_build/html
 	@echo "open docs/_build/html/index.html"
 
-format: $(STAMP)
+format: $(DEVELOPERS)
 	@$(BIN)/ruff check --fix .
 	@$(BIN)/ruff format .
 
@@ -63,14 +68,21 @@ $(STAMP): pyproject.toml
 	  echo "suboctave needs Python 3.11 to 3.15; none that runs was found on the PATH." >&2; \
 	  echo "Install one, or name it: make PYTHON=/path/to/python" >&2; exit 1; \
 	fi; \
-	echo "Installing into $(VENV) with $$($$found --version) ..."; \
+	echo "Installing into $(VENV) with $$($$found --version): about 620 MB on disk, 170 MB to download ..."; \
 	$$found -m venv --clear $(VENV) \
-	  && $(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]' \
-	  && echo "Compiling, once ..." && $(BIN)/suboctave compile \
+	  && $(INSTALL) . \
+	  && du -sh $(VENV) | awk '{ print $$1 " installed in $(VENV)" }' \
+	  && echo "Compiling the numerical kernels, once: about a minute ..." \
+	  && $(BIN)/suboctave compile \
 	  && touch $(STAMP)
 
-$(VENV)/.docs: $(STAMP)
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev,docs]' && touch $@
+$(DEVELOPERS): $(STAMP)
+	@echo "Installing what tests and lint need besides: about 120 MB ..."
+	@$(INSTALL) '.[dev]' && touch $@
+
+$(VENV)/.docs: $(DEVELOPERS)
+	@echo "Installing what the site needs besides: about 60 MB ..."
+	@$(INSTALL) '.[dev,docs]' && touch $@
 
 clean:
 	rm -rf $(VENV) $(DEMO) docs/_build docs/examples build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks

@@ -20,7 +20,7 @@ from numba.core import caching
 from numba.core.errors import TypingError
 
 from suboctave import compiled
-from suboctave.study import compilation
+from suboctave.study import compilation, computations
 
 SOURCE = """
 from suboctave.compiled import kernel
@@ -49,6 +49,7 @@ def made(tmp_path, monkeypatch):
 
     def make():
         monkeypatch.setattr(compiled, "_printed", set())
+        monkeypatch.setattr(compiled, "_waiting", compiled._Waiting())
         spec = importlib.util.spec_from_file_location("suboctave_kernels_of_a_test", path)
         module = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(module)
@@ -64,7 +65,17 @@ def test_a_kernel_is_compiled_at_its_first_call_with_one_line_that_says_so(made,
     assert len(total.signatures) == 2
     error = capsys.readouterr().err
     assert error.count("\n") == 1
-    assert "once only" in error
+    assert "once: up to a minute" in error
+
+
+def test_a_notebook_shows_a_bar_and_no_red_box(made, capsys, monkeypatch):
+    shown = []
+    monkeypatch.setattr(compiled, "in_notebook", lambda: True)
+    monkeypatch.setattr(compiled, "notebook_line", lambda: lambda text, running: shown.append((running, text)))
+    assert made()(VALUES) == 30.0
+    assert [running for running, _ in shown] == [True, False]
+    assert "compiled 1 of its kernels" in shown[-1][1]
+    assert not capsys.readouterr().err
 
 
 def test_what_an_earlier_process_has_compiled_is_loaded_without_a_word(made, capsys):
@@ -212,6 +223,54 @@ def test_several_threads_may_call_a_kernel_while_one_of_them_compiles_it(made):
     assert len(total.signatures) == 1
 
 
+def test_a_process_waits_for_another_one_that_compiles_the_same(made):
+    fcntl = pytest.importorskip("fcntl")
+    total = made()
+    with open(f"{total._cache._cache_file._index_path}.lock", "ab") as file, ThreadPoolExecutor(1) as pool:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        waiting = pool.submit(total, VALUES)
+        with pytest.raises(TimeoutError):
+            waiting.result(timeout=0.3)
+        fcntl.flock(file, fcntl.LOCK_UN)
+        assert waiting.result() == 30.0
+
+
+@pytest.fixture
+def command(tmp_path, monkeypatch):
+    """`compile_all` with one small kernel in the place of all, in a cache of its own; how often it has computed."""
+    monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.setattr(compiled, "KERNELS", [])
+    path, computed, reports = tmp_path / "kernels_of_the_command.py", [], []
+    path.write_text(SOURCE)
+    spec = importlib.util.spec_from_file_location("suboctave_kernels_of_the_command", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+
+    def compute(function, tasks, workers):
+        computed.append(module.total(VALUES))
+        yield 0, None
+
+    monkeypatch.setattr(compilation, "completed", compute)
+    return lambda: (compilation.compile_all(lambda *of: reports.append(of)), len(computed), reports)
+
+
+def test_the_command_does_nothing_where_everything_is_compiled(command):
+    count, computed, reports = command()
+    assert (count, computed) == (2, 1)
+    assert reports[0][0] == 0.0
+    assert command()[:2] == (0, 1)
+
+
+@pytest.mark.parametrize("how", ["one bit", "unreadable", "other sources"])
+def test_the_command_computes_again_where_something_has_changed(command, tmp_path, monkeypatch, how):
+    command()
+    if how == "other sources":
+        monkeypatch.setattr(compilation, "_PACKAGE", tmp_path)
+    else:
+        damaged(next((tmp_path / "cache").rglob("*total*.nbc")), how)
+    assert command()[1] == 2
+
+
 DIGITS = """
 import numpy as np
 from suboctave.harmonic.quadrature import search_grid
@@ -250,7 +309,7 @@ def signatures() -> dict[str, list[str]]:
 
 def after(script: str, generated: Path) -> dict[str, list[str]]:
     """`signatures` of a process that has run this; generated code kept before would hide the kernels that it calls."""
-    code = f"import json, test_compiled; from suboctave.study import compilation\n{script}\n"
+    code = f"import json, test_compiled; from suboctave.study import computations\n{script}\n"
     code += "print('\\n' + json.dumps(test_compiled.signatures()))"
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=Path(__file__).parent, capture_output=True, text=True, check=True,
@@ -262,7 +321,7 @@ def after(script: str, generated: Path) -> dict[str, list[str]]:
 @pytest.mark.slow
 def test_after_the_command_no_example_compiles_anything(tmp_path):
     examples = [str(path) for path in sorted((Path(__file__).parents[1] / "examples").glob("ex*.py"))]
-    there = after(f"for i in range({len(compilation.COMPUTATIONS)}): compilation.run(i)", tmp_path / "command")
+    there = after(f"for i in range({len(computations.COMPUTATIONS)}): computations.run(i)", tmp_path / "command")
     script = f"import runpy, sys; sys.argv = ['']\nfor path in {examples!r}: runpy.run_path(path)"
     used = after(script, tmp_path / "examples")
     missing = {name: set(texts) - set(there.get(name, ())) for name, texts in used.items()}

@@ -1,11 +1,12 @@
 """Numba kernels: compiled once, kept in Numba's cache, and loaded from there by every later process.
 
 `suboctave compile` compiles all of them, and set-up runs it. A kernel that is not in the cache is compiled when it is
-first called, and one line on standard error says what the process waits for. Nothing else decides which code runs: the
-same input gives the same bits in every process.
+first called, and one line on standard error, or a bar in a notebook, says what the process waits for. Nothing else
+decides which code runs: the same input gives the same bits in every process.
 
 The cache is the folder `__pycache__` beside the sources where that can be written, else Numba's folder in the user's
 directory for caches (`NUMBA_CACHE_DIR` names another); where none can be written every process compiles for itself.
+Several processes compile a kernel once: the others wait for it.
 What has been compiled serves as long as the files of a kernel, and of all that it calls, are what they were, and as
 long as its own file is whole: a digest tells, and what is damaged is compiled anew. Ctrl-C waits until a compilation is
 over, for it would leave Numba's compiler in a state in which it compiles nothing any more.
@@ -22,14 +23,19 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
+from time import monotonic
 from typing import Any, TypeVar
 
 import numpy as np
 from numba import config, njit
 from numba.core import event
 from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.compiler_lock import global_compiler_lock
+
+from suboctave.progress import notebook_line
+from suboctave.session import in_notebook
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -40,10 +46,7 @@ KERNELS: list[Any] = []
 _THOROUGH = (config.OPT, config.LOOP_VECTORIZE)
 _SWIFT = (type(config.OPT)(min(int(config.OPT), 1)), 0)
 
-_WAITING = (
-    "suboctave compiles code that is not in its cache yet: some seconds, once only (`suboctave compile` compiles "
-    "everything beforehand)"
-)
+_WAITING = "suboctave compiles its kernels, once: up to a minute (`suboctave compile` compiles all of them beforehand)"
 _NO_CACHE = (
     "suboctave can write neither beside its sources nor into the user's directory for caches: every process compiles "
     "anew. NUMBA_CACHE_DIR names a folder that can be written"
@@ -57,14 +60,46 @@ def _print_once(text: str) -> None:
         print(text, file=sys.stderr, flush=True)
 
 
+class _Waiting:
+    """What a process shows while it compiles: one line on standard error, once; in a notebook, where that would be a
+    red box, a bar that runs while something is compiled.
+    """
+
+    def __init__(self) -> None:
+        self.silent = False
+        #: functions compiled, seconds spent, and where a notebook shows them
+        self._count, self._seconds, self._begun = 0, 0.0, 0.0
+        self._line: Callable[[str, bool], None] | None = None
+
+    def begins(self) -> None:
+        """A compilation begins that is no part of another one."""
+        if self.silent:
+            return
+        if not in_notebook():
+            _print_once(_WAITING)
+            return
+        self._begun, self._line = monotonic(), self._line or notebook_line()
+        self._line(_WAITING, True)
+
+    def ends(self) -> None:
+        """It is over."""
+        if self._line is not None:
+            self._count, self._seconds = self._count + 1, self._seconds + monotonic() - self._begun
+            self._line(f"suboctave has compiled {self._count} of its kernels in {self._seconds:.0f} s, once", False)
+
+
+_waiting = _Waiting()
+
+
 def notice() -> None:
-    """Print the line that says what this process waits for, once."""
-    _print_once(_WAITING)
+    """Say what this process waits for, which another one compiles."""
+    _waiting.begins()
+    _waiting.ends()
 
 
 def without_notice() -> None:
-    """Let this process compile without the line that says so: for those who have asked for it."""
-    _printed.add(_WAITING)
+    """Let this process compile without a word: for those who have asked for it."""
+    _waiting.silent = True
 
 
 class _Compilation(event.Listener):
@@ -81,19 +116,24 @@ class _Compilation(event.Listener):
 
     def on_start(self, event: Any) -> None:
         """Numba is about to compile a function, whosever it is."""
-        self._before.append((config.OPT, config.LOOP_VECTORIZE, gc.isenabled()))
         function = event.data["dispatcher"]
-        if function.py_func.__module__.startswith("suboctave"):
-            notice()
+        own = function.py_func.__module__.startswith("suboctave")
+        outermost = own and not any(before[-1] for before in self._before)
+        self._before.append((config.OPT, config.LOOP_VECTORIZE, gc.isenabled(), own))
+        if own:
+            if outermost:
+                _waiting.begins()
             gc.disable()
             fast = bool(function.targetoptions.get("fastmath"))
             config.OPT, config.LOOP_VECTORIZE = _THOROUGH if fast else _SWIFT
 
     def on_end(self, event: Any) -> None:
         """It has done so, or failed."""
-        config.OPT, config.LOOP_VECTORIZE, collecting = self._before.pop()
+        config.OPT, config.LOOP_VECTORIZE, collecting, own = self._before.pop()
         if collecting:
             gc.enable()
+        if own and not any(before[-1] for before in self._before):
+            _waiting.ends()
 
 
 event.register("numba:compile", _Compilation())
@@ -170,9 +210,29 @@ class Cache(FunctionCache):
         self.stamps = tuple(sorted(stamps))
         self._cache_file = _Files(self._cache_path, self._impl.filename_base, self.stamps)
 
+    @contextmanager
+    def alone(self) -> Iterator[None]:
+        """Let other processes wait that would compile the same, and find it here then; without a word where files
+        cannot be locked.
+        """
+        # the compiler before the file: no thread waits for a file while it holds what another one needs
+        with global_compiler_lock, ExitStack() as held:
+            with suppress(ImportError, OSError):
+                import fcntl
+
+                place = Path(f"{self._cache_file._index_path}.lock")
+                place.parent.mkdir(parents=True, exist_ok=True)
+                file = held.enter_context(place.open("ab"))  # which lets the lock go when it is closed
+                fcntl.flock(file, fcntl.LOCK_EX)
+            yield
+
     def holds(self, signature: Any, target: Any) -> bool:
         """Whether something that was compiled for these types is kept."""
         return self._cache_file.load(self._index_key(signature, target.codegen())) is not None
+
+    def holds_any(self) -> bool:
+        """Whether anything that was compiled is kept."""
+        return bool(self._cache_file._names())
 
     def load_overload(self, signature: Any, target: Any) -> Any:
         """What has been compiled for these types; None where there is nothing that this process can use."""
@@ -218,6 +278,14 @@ def cached(**options: Any) -> Callable[[_Function], Any]:
             result._cache = Cache(function, called)
         except RuntimeError:  # no folder for the cache
             _print_once(_NO_CACHE)
+        else:
+            compile_one, cache = result.compile, result._cache
+
+            def alone(signature: Any) -> Any:
+                with cache.alone():
+                    return compile_one(signature)
+
+            result.compile = alone
         compile_for = result._compile_for_args
 
         def uninterrupted(*arguments: Any, **named: Any) -> Any:
@@ -231,7 +299,7 @@ def cached(**options: Any) -> Callable[[_Function], Any]:
 
 
 def kernel(**options: Any) -> Callable[[_Function], Any]:
-    """Decorator of a kernel: `cached` with these options.
+    """Decorator of a kernel: `cached` with these options; a quotient by zero is not finite, without an exception.
 
     Sums that the compiler may reorder (`fastmath`) are inlined wherever they are called, with all that is around them.
     Else each caller would have a copy beside the original, compiled in other company and so reordered otherwise, and
@@ -243,7 +311,7 @@ def kernel(**options: Any) -> Callable[[_Function], Any]:
             return np.errstate(all="ignore")(function)
         called = [function.__globals__.get(name) for name in function.__code__.co_names]
         inlined = "fastmath" in options or any(getattr(k, "targetoptions", {}).get("forceinline") for k in called)
-        result = cached(forceinline=inlined, **options)(function)
+        result = cached(forceinline=inlined, **{"error_model": "numpy", "no_cfunc_wrapper": True} | options)(function)
         KERNELS.append(result)
         return result
 

@@ -122,3 +122,15 @@ def notebook_bar(title: str) -> Iterator[Report]:
         yield report
     finally:
         shown.update(HTML(""))
+
+
+def notebook_line() -> Callable[[str, bool], None]:
+    """A line in the output of a notebook's cell that can be changed: a text, and whether a bar runs before it."""
+    from IPython.display import HTML, display
+
+    shown = display(HTML(""), display_id=True)
+
+    def show(text: str, running: bool) -> None:
+        shown.update(HTML(f"{'<progress></progress> ' if running else ''}<small>{escape(text)}</small>"))
+
+    return show

@@ -143,7 +143,8 @@ def _first_doubtful(places, tests, at, first):
         sign = 1.0 if fp > 0.0 else -1.0
         # the grid, and in their places where the cubic off the chord is extreme: its derivative is a s^2 + b s + c
         looks = grid
-        shares[:grid] = _GRID
+        for k in range(grid):
+            shares[k] = _GRID[k]
         a, b, c = 3.0 * third, 2.0 * (bent - third * (shift - p + h)), chord - bent * h + third * (shift - p) * h
         inside = b * b - 4.0 * a * c
         if inside >= 0.0:

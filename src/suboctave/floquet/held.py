@@ -152,7 +152,7 @@ def _moved(multipliers, places, coupled, k, function):
         for i in range(counts.shape[0]):
             for j in range(counts.shape[0]):
                 column[i, j] = 0 if counts[i] + (counts[j] if k == 2 else 1) > 2 else -1
-        multiply(multipliers[q], k, column, function[q])
+        multiply(multipliers[q], k, column, function[q, :, :1])
 
 
 @kernel()

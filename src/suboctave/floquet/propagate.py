@@ -33,6 +33,8 @@ _FAST = {"reassoc", "contract", "nsz"}
 #: relative errors of the entries of a monodromy matrix by rounding
 _ROUNDING = 1e-15
 _TINY = float(np.finfo(float).tiny)
+#: the first column, as a number that kernels are not compiled for once more
+_FIRST = np.int64(0)
 
 
 @kernel(fastmath=_FAST, error_model="numpy")
@@ -141,6 +143,22 @@ def _kick(amount, read, driven, total):
 
 
 @kernel(fastmath=_FAST, error_model="numpy")
+def _enter(entering, rows, count, f, packed, added, total):
+    """Add what forces f at the nodes `rows`, count of them, leave in the states (S, .) at a panel's end; packed and
+    added are room to work in.
+    """
+    size = total.shape[0]
+    into = packed[: size * count].reshape(size, count)
+    for s in range(size):
+        for l in range(count):
+            into[s, l] = entering[s, rows[l]]
+    np.dot(into, f[:count], added)
+    for s in range(size):
+        for j in range(total.shape[1]):
+            total[s, j] += added[s, j]
+
+
+@kernel(fastmath=_FAST, error_model="numpy")
 def march(structures, stretch, forms, law, loose, kick, active, total, kept, acting, solved, states):
     """Perturbations along the panels of one period, and with them the response to the forces r.
 
@@ -184,7 +202,7 @@ def march(structures, stretch, forms, law, loose, kick, active, total, kept, act
             kicked = kicked or kick[channel, p] != 0.0
         count, moving = _tangents(law, loose, active, p, forced, values, acts, rows)
         if later and (kicked or begins or count > 0):
-            _turn(waiting, forms.first[now], 0, free, total)
+            _turn(waiting, forms.first[now], _FIRST, free, total)
             later = False
         if begins:
             now = stretch[p]
@@ -195,17 +213,15 @@ def march(structures, stretch, forms, law, loose, kick, active, total, kept, act
             if kick[active[g], p] != 0.0:
                 _kick(kick[active[g], p], reading[d, 0, g * m], driven[:, g], total)
         if count > 0:
-            if forced:
-                states[p] = total
+            for s in range(size if forced else 0):
+                for j in range(columns):
+                    states[p, s, j] = total[s, j]
             _solve(reading[d], influence[d], total, values, acts, rows, count, moving, forced, a, seen, f, speed)
-            _turn(moved[d], first, 0, columns, total)
-            into = packed[: size * count].reshape(size, count)
-            for l in range(count):
-                into[:, l] = entering[d, :, rows[l]]
-            np.dot(into, f[:count], added)
-            total += added
-            if forced:
-                solved[p, rows[:count]] = f[:count]
+            _turn(moved[d], first, _FIRST, columns, total)
+            _enter(entering[d], rows, count, f, packed, added, total)
+            for l in range(count if forced else 0):
+                for j in range(columns):
+                    solved[p, rows[l], j] = f[l, j]
         else:
             for b in range(moved.shape[1]):
                 _follow(moved[d, b], waiting[b], later)
@@ -218,7 +234,7 @@ def march(structures, stretch, forms, law, loose, kick, active, total, kept, act
                 for s in range(size):
                     total[s, free] += entering[d, s, l] * values[0, l]
     if later:
-        _turn(waiting, forms.first[now], 0, free, total)
+        _turn(waiting, forms.first[now], _FIRST, free, total)
     if forms.turning[now + 1]:
         _other_form(forms.turns[now + 1], total, added)
 
@@ -268,7 +284,7 @@ def response(structures, stretch, forms, active, acting, solved, states, start, 
                     value += influence[d, part, row, l] * force[l]
                 # the last node of a panel is the first of the next
                 out[active[row // m], part, p * (m - 1) + row % m] = value
-        _turn(moved[d], forms.first[now], 0, 1, state)
+        _turn(moved[d], forms.first[now], _FIRST, state.shape[1], state)
         for s in range(size):
             for l in range(groups * m):
                 state[s, 0] += entering[d, s, l] * force[l]

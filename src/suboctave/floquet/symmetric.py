@@ -159,5 +159,6 @@ def in_rings(mu, k):
     for q in range(motions):
         multiply(mu[q], k, inner, out[q, :, :own])
         if count > own:
-            multiply(mu[q], 3, between, out[q, :, own:])
+            # k is 2: the next one of the four
+            multiply(mu[q], k + 1, between, out[q, :, own:])
     return out

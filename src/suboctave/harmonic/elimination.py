@@ -36,14 +36,16 @@ _ROUNDING, _BESIDE = 1e-12, 1e-9
 _PARALLEL = 1e4
 #: least frequency that scales a state, relative to the largest
 _LEAST = 1e-6
+#: no derivative by Omega, as a number that kernels are not compiled for once more
+_NONE = np.int64(0)
 
 
 class Stack(NamedTuple):
-    """M, C, K, S in the coordinates (q, z) with loads' columns, all entries in a row, (4, .); how many q, z and columns
-    with those of q; if zz is a diagonal.
+    """M, C, K, S in the coordinates (q, z) with loads' columns, all entries in a row, (4, .), complex for one kind of
+    kernels; how many q, z and columns with those of q; if zz is a diagonal.
     """
 
-    entries: NDArray[Any]
+    entries: ComplexArray
     sizes: tuple[int, int, int]
     diagonal: bool
 
@@ -54,7 +56,7 @@ class Stack(NamedTuple):
         if diagonal:
             parts = [(*part[:3], part[3].diagonal()) for part in parts]
         rows = [np.concatenate([one.ravel() for one in part]) for part in parts]
-        return cls(np.array(rows), (*parts[0][1].shape, parts[0][0].shape[1]), diagonal)
+        return cls(np.array(rows, dtype=complex), (*parts[0][1].shape, parts[0][0].shape[1]), diagonal)
 
     def between(self, frequency: NDArray[Any], order: int, left: ComplexArray, right: ComplexArray) -> ComplexArray:
         """`[1 -left^T] Z [1; -right]` of the dynamic stiffness Z, differentiated by Omega, at frequencies, (F, m, m +
@@ -156,7 +158,7 @@ def between(entries, diagonal, frequency, order, left, right, out):
     """See `Stack.between`."""
     (s, columns), m = right.shape[1:], left.shape[2]
     z, along = np.empty(entries.shape[1], dtype=np.complex128), np.empty((s, columns), dtype=np.complex128)
-    across = along[:, :0]
+    across = np.empty((s, 0), dtype=np.complex128)
     for f in range(frequency.shape[0]):
         _dynamic(entries, frequency[f], order, z)
         _beside(z, diagonal, left[f], right[f], across, along)
@@ -178,7 +180,7 @@ def eliminated(entries, diagonal, frequency, right, left, out):
     inner = back + s * columns
     z = np.empty(entries.shape[1], dtype=np.complex128)
     for f in range(frequency.shape[0]):
-        _dynamic(entries, frequency[f], 0, z)
+        _dynamic(entries, frequency[f], _NONE, z)
         if diagonal:
             for k in range(s):
                 flexible = 1.0 / z[inner + k]
@@ -211,7 +213,7 @@ def answered(entries, diagonal, frequency, a, a_diagonal, a_order, b, b_diagonal
     by_b = np.empty(b.shape[1], dtype=np.complex128)
     across, along = np.empty((2, s, m), dtype=np.complex128), np.empty((2, s, columns), dtype=np.complex128)
     for f in range(frequency.shape[0]):
-        _dynamic(entries, frequency[f], 0, z)
+        _dynamic(entries, frequency[f], _NONE, z)
         _dynamic(a, frequency[f], a_order, by_a)
         _dynamic(b, frequency[f], b_order, by_b)
         _beside(by_a, a_diagonal, left[f], right[f], across[0], along[1])

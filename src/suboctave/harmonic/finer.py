@@ -14,7 +14,7 @@ one factorisation of the matrix of H harmonics, and products with R_X by fast Fo
 from __future__ import annotations
 
 import numpy as np
-import scipy.fft
+import scipy
 from scipy.linalg import lapack
 
 from suboctave.harmonic.basis import Array, ComplexArray, to_complex, to_real

@@ -222,7 +222,7 @@ class StructuralMatrices(EquationOfMotion):
         return _blocks(feeding_matrices(self.matrices), frequency, 0)
 
 
-def fed_matrices(matrices: Array, rate: float) -> Array:
+def fed_matrices(matrices: NDArray[Any], rate: float) -> NDArray[Any]:
     """M, C, K, S (4, ...) with `C - rate M` for C."""
     result = matrices.copy()
     result[1] -= rate * matrices[0]

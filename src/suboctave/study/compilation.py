@@ -1,94 +1,120 @@
 """`suboctave compile`: all kernels compiled before anybody waits for them.
 
-Numba compiles a kernel for the types of its arguments when it is called with them. So small computations are run that
-between them call every kernel with all types that occur; what they give is not looked at. Two processes share them, in
-the order of the list, and each finds in the cache what the other one has compiled: responses come last, which need what
-equations and stability have in common with them.
+A record beside what has been compiled says for which sources, versions and processor that was, and by digests that it
+is whole: where all of this is as it was there is nothing to do.
 """
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable
+import hashlib
+import json
+import platform
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from time import monotonic
+from typing import Any
 
-import numpy as np
+import llvmlite
+import numba
 
-from suboctave.analysis.branches import frequency_response, switch_branch
-from suboctave.analysis.track import track
-from suboctave.compiled import without_notice
+from suboctave import compiled
+from suboctave.atomic import replace_file
 from suboctave.errors import SuboctaveError
-from suboctave.floquet.monodromy import floquet_multipliers
-from suboctave.harmonic.basis import HarmonicBasis
-from suboctave.harmonic.evaluation import HarmonicBalance
-from suboctave.model import ElasticStop, HarmonicLoad, System, library
-from suboctave.timedomain.flow import Flow
+from suboctave.version import __version__
 from suboctave.workers import Lost, completed
 
 Report = Callable[[float, str], None]
 
-
-def _equations() -> None:
-    """Harmonic balance of one motion."""
-    state = HarmonicBalance(library.duffing(), HarmonicBasis(3)).at(np.ones((7, 1)), 1.0)
-    state.extended_jacobian("omega")
-
-
-def _stability() -> None:
-    """Multipliers of a motion that no element acts on: it keeps the equations' kernels out of it."""
-    system = System(1.0, 0.1, 1.0, loads=[HarmonicLoad(0, 1.0)])
-    floquet_multipliers(HarmonicBalance(system, HarmonicBasis(3)).at(np.ones((7, 1)), 1.0))
+_PACKAGE = Path(compiled.__file__).parent
+#: seconds between changes of the bar
+_LOOK = 1.0
+#: share of the work from which on the time that is left is worth telling
+_KNOWN = 0.1
 
 
-def _responses() -> None:
-    """Exact and rounded contact: period doubling and fold, their curves, the doubled motion; a structure with unknowns
-    at its stop only, one vibration of which decays between contacts, and one of which three more are faster than
-    its harmonics and coupled by damping.
+def _state() -> str:
+    """What kernels in the cache are compiled for: sources, versions, processor."""
+    from llvmlite.binding import get_host_cpu_features, get_host_cpu_name
+
+    sources = [(str(path), path.stat().st_mtime_ns, path.stat().st_size) for path in sorted(_PACKAGE.rglob("*.py"))]
+    versions = (__version__, platform.python_version(), numba.__version__, llvmlite.__version__)
+    processor = (get_host_cpu_name(), get_host_cpu_features().flatten())
+    return hashlib.sha256(repr((sources, versions, processor)).encode()).hexdigest()
+
+
+def _record() -> Path | None:
+    """The file that says what has been compiled; None where there is no folder for a cache."""
+    try:
+        return Path(compiled.Cache(_state, []).cache_path) / "suboctave_compiled.json"
+    except RuntimeError:
+        return None
+
+
+def _digest(path: Path) -> str:
+    return hashlib.blake2b(path.read_bytes(), digest_size=16).hexdigest()
+
+
+def _is_compiled(record: Path, state: str) -> bool:
+    """Whether everything has been compiled, for what is here now, and is whole."""
+    try:
+        known: dict[str, Any] = json.loads(record.read_text())
+        return known["state"] == state and all(_digest(Path(path)) == d for path, d in known["files"].items())
+    except (OSError, ValueError, KeyError, AttributeError):
+        return False
+
+
+def _write(record: Path, state: str) -> None:
+    """Remember what has been compiled, and for which state."""
+    with suppress(OSError):  # the next call looks again at everything
+        folders = {Path(kernel._cache.cache_path) for kernel in compiled.KERNELS}
+        files = {str(path): _digest(path) for folder in sorted(folders) for path in sorted(folder.glob("*.nb[ic]"))}
+        text = json.dumps({"state": state, "files": files})
+        replace_file(record, lambda place: place.write_text(text))
+
+
+@contextmanager
+def _watched(report: Report) -> Iterator[None]:
+    """Report meanwhile how much has been compiled: kernels in the cache, by the lengths of their code."""
+    lengths = {kernel: len(kernel.py_func.__code__.co_code) for kernel in compiled.KERNELS}
+    begin, over = monotonic(), threading.Event()
+    there: set[Any] = {kernel for kernel in lengths if kernel._cache.holds_any()}
+    work = sum(length for kernel, length in lengths.items() if kernel not in there) or 1
+
+    def watch() -> None:
+        while True:
+            there.update(kernel for kernel in lengths if kernel not in there and kernel._cache.holds_any())
+            left = sum(length for kernel, length in lengths.items() if kernel not in there)
+            share, seconds = 1.0 - left / work, monotonic() - begin
+            rest = f", about {seconds * (1.0 / share - 1.0):.0f} s left" if share > _KNOWN else ""
+            report(share, f"{len(there)} of {len(lengths)} kernels{rest}")
+            if over.wait(_LOOK):
+                return
+
+    thread = threading.Thread(target=watch, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
+
+
+def compile_all(report: Report) -> int:
+    """Compile every kernel that is not in the cache; `report(share done, what is left)` is called. Returns how many
+    kernels there are, 0 if all had been compiled before.
     """
-    system = library.reference_oscillator()
-    doubling = frequency_response(system, (4.05, 3.9)).bifurcations[0]
-    track(doubling, "j", (0.0, 0.03), max_step=0.2)
-    switch_branch(doubling, bounds=(3.9, 4.05))
-    system = library.reference_oscillator(regularization=3000.0)
-    fold = frequency_response(system, (0.75, 0.79), harmonics=3).bifurcations["LP"][0]
-    track(fold, "j", (0.0, 0.03), max_step=0.2)
-    for fast in ((), (4e2, 9e2, 2e3)):
-        n = 2 + len(fast)
-        stiffness = np.diag([2.0, 2.0, *fast]) - np.eye(n, k=1) - np.eye(n, k=-1)
-        damping = np.diag([0.1, 8.0, *(1.0 for _ in fast)]) - 0.1 * np.eye(n, k=1) - 0.1 * np.eye(n, k=-1)
-        structure = System(np.eye(n), damping, stiffness, [ElasticStop(0, 5.0, 0.3)], [HarmonicLoad(0, 1.0)])
-        motion = frequency_response(structure, (1.0, 1.02), harmonics=9).orbits[0]
-        # as normal forms ask for it
-        motion.state().linear.stiffness(motion.basis.multiples * motion.omega, 2)
+    record, state = _record(), _state()
+    if record is not None and _is_compiled(record, state):
+        return 0
+    from suboctave.study import computations  # and with it all kernels
 
-
-def _in_time() -> None:
-    """A trajectory with located contacts, and tangent vectors beside it: what judges their steps."""
-    system = System(1.0, 0.05, 1.0, [ElasticStop(0, 5.0, 0.3)], [HarmonicLoad(0, 1.0)])
-    Flow(system, tangents=1).over([0.0, 0.0], 1.0, 1)
-
-
-COMPUTATIONS: tuple[tuple[str, Callable[[], None]], ...] = (
-    ("equations", _equations),
-    ("stability", _stability),
-    ("motions in time", _in_time),
-    ("responses", _responses),
-)
-
-
-def run(number: int) -> None:
-    """One computation of the list; what it warns of does not matter."""
-    without_notice()
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        COMPUTATIONS[number][1]()
-
-
-def compile_all(report: Report) -> None:
-    """Compile every kernel that is not in the cache; `report(share done, what is left)` is called."""
-    left = {number: name for number, (name, _) in enumerate(COMPUTATIONS)}
-    report(0.0, "; ".join(left.values()))
-    for number, result in completed(run, range(len(COMPUTATIONS)), 2):
-        name = left.pop(number)
-        if isinstance(result, Lost):
-            raise SuboctaveError(f"kernels of {name} were not compiled: {result.words}")
-        report(1.0 - len(left) / len(COMPUTATIONS), "; ".join(left.values()))
+    names = [name for name, _ in computations.COMPUTATIONS]
+    with _watched(report):
+        for number, result in completed(computations.run, range(len(names)), 2):
+            if isinstance(result, Lost):
+                raise SuboctaveError(f"kernels of {names[number]} were not compiled: {result.words}")
+    if record is not None:
+        _write(record, state)
+    return len(compiled.KERNELS)

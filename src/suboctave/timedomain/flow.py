@@ -25,7 +25,6 @@ from suboctave.model.elements.base import Array
 from suboctave.model.inputs import check_count
 from suboctave.model.system import System
 from suboctave.progress import Report
-from suboctave.timedomain.adaptive import AdaptiveMethod
 from suboctave.timedomain.batch import Batch, Group, Method
 from suboctave.timedomain.law_code import PythonCallbacks
 from suboctave.timedomain.layout import Layout
@@ -163,6 +162,8 @@ class Flow:
         if method == "newmark":
             self.integrator = NewmarkMethod(self.layout, samples, steps, tolerance, lanes)
         else:
+            from suboctave.timedomain.adaptive import AdaptiveMethod  # and with it all of scipy.integrate
+
             self.integrator = AdaptiveMethod(self.layout, samples, tolerance, lanes, tangents, transition)
 
     def over(
