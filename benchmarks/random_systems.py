@@ -267,7 +267,7 @@ class Row:
 
 
 def compare(answer: dict[str, Any], branch: so.Branch, width: float) -> Row:
-    """A branch held against the judge's answer."""
+    """A branch beside the judge's answer; what lies behind an end that the branch calls early is said to be missing."""
     row = Row()
     mine = [item for item in branch.bifurcations if item.kind != "grazing"]
     theirs, counts = answer["events"], answer["unstable"]
@@ -290,7 +290,8 @@ def compare(answer: dict[str, Any], branch: so.Branch, width: float) -> Row:
     for i, item in enumerate(theirs):
         if i not in paired:
             text = f"{item['kind']} {item['omega']:.9f} (multiplier {complex(*item['multiplier']):.4f})"
-            (row.said if stated(item["omega"], branch, width) else row.missed).append(text)
+            ended = branch.endings[-1].early and i > max(paired, default=-1)
+            (row.said if ended or stated(item["omega"], branch, width) else row.missed).append(text)
     # beside its parent the judge leaves a curve to the parent
     least = JUDGED * max(map(odd_part, branch.orbits)) if branch.nu == 2 else -1.0
     more = [item for j, item in enumerate(mine) if j not in own and odd_part(item.orbit) > least]
