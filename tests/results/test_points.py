@@ -212,3 +212,19 @@ def test_grazing_contacts_are_printed_apart():
     assert len(curve.bifurcations) == (at - 1 if rows[0] != "no bifurcations" else 0)
     (axes,) = curve.plot(quantity="velocity").axes
     assert axes.get_ylabel() == r"velocity $\max\,|\dot{q}_{1}|$"
+
+
+def test_a_tracked_curve_beside_its_extremum():
+    """Two period doublings at a gap just below the largest one, between points of the curve, none above it."""
+    system = so.library.reference_oscillator(p=0.55, j=0.17)
+    response = so.frequency_response(system, (2.2, 1.9), harmonics=5)
+    curve = so.track(response.bifurcations["PD"][0], "j", (0.15, 0.3))
+    (top,) = (item for item in curve.extrema if item.parameter_name == "j")
+    largest = top.parameter("j")
+    below = curve.at(j=largest - 1e-8)
+    assert len(below) == 2
+    assert min(below.omega) < top.omega < max(below.omega)
+    assert_allclose(below.omega, top.omega, rtol=1e-3)
+    assert len(curve.at(j=largest + 1e-8)) == 0
+    highest = so.track(top, "p", (0.5, 0.6))
+    assert_allclose(highest.at(p=0.55)[0].parameter("j"), largest, rtol=1e-8)

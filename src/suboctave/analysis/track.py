@@ -181,6 +181,8 @@ def _branch(
     system, kind = item.orbit.system, kind_of(item)
     known, own = item.context or {}, ["damped", "mode", "still", *(["onto"] if kind in MOTION_KINDS else [])]
     options = {**options, **{name: known[name] for name in own if name in known}}
+    if item.multiplicity > 1:
+        options["multiplicity"] = item.multiplicity
     context = {"system": system, "parameter": names[-1], **options}
     met = [replace(event, context=context) for event in trace.bifurcations]
     return tracked_class(options)(

@@ -82,7 +82,7 @@ class Between:
     def _located(self) -> list[Bifurcation]:
         """What was located with a motion that its equations can be solved at: turns in any case."""
         met = [*self.curve.bifurcations.met, *self.curve.events.met]
-        return [item for item in met if item.kind == "extremum"] if self.tracked else met
+        return [item for item in met if item.kind in ("extremum", "CP")] if self.tracked else met
 
     # ------------------------------------------------------------------------------------------------------- points
     def point_at(self, node: Node) -> CurvePoint:
@@ -102,11 +102,17 @@ class Between:
         return make_point(correct(problem, u, null_row(problem, u, weights), weights, self.newton), None, 0.0)
 
     def _singled(self, node: Node) -> CurvePoint:
-        item = node.item if isinstance(node.item, Bifurcation) else self._as_located(node.item)
+        item = self._as_located(self._as_point(node.item) if isinstance(node.item, Bifurcation) else node.item)
         bounds = self.curve.options.get("bounds", {})
         ranges = {n: (min(bounds[n]), max(bounds[n])) for n in self.names if n in bounds}
         settings = Settings(self.newton, SteppingOptions(), self.method)
         return solved_start(item, node.orbit.basis, None, self.names, ranges, settings)
+
+    def _as_point(self, event: Bifurcation) -> TrackedPoint:
+        """An extremum along the curve as one of its points."""
+        time = 0.0 if event.contact is None else event.contact.time * event.orbit.omega / event.orbit.basis.nu
+        extra = time if self.curve.kind == "grazing" else event.kappa
+        return TrackedPoint(event.orbit, event.floquet, event.arclength, 0, self.method, extra)
 
     def _as_located(self, point: TrackedPoint) -> Bifurcation:
         """A point of a curve of bifurcations, or of motions singled out, as something that such a curve begins at."""
