@@ -86,14 +86,18 @@ def doubled_size(curve: MotionProblem, u: Array) -> float:
 
 #: distances from a branch point, in scaled arclength, at which a branch that leaves it begins
 _DISTANCES = (3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6)
-#: odd part, in units of the motion, of the first and last motions of a branch of doubled motions, and the least to
-#: which it is divided by the third number while the motion is not yet like that of the bifurcation
-_FIRST, _LEAST, _CLOSER = 3e-3, 1e-6, 3.0
-#: by how much the ratio of the parameter's way to the square of the odd part may change from one of them to the next
+#: size of the odd part, in units of the motion, at which a branch of doubled motions begins
+_FIRST = 3e-3
+#: factor by which it is divided while the motion there is not yet like that of the bifurcation
+_CLOSER = 3.0
+#: least size at which it begins: beyond, rounding turns the odd part
+_LEAST = 1e-6
+#: by how much the ratio of the parameter's way to the square of the odd part may change from one size to the next
 _BENT = 0.05
-#: cosine of the directions of two odd parts that are one, at least; distance from where a doubling is foretold at which
-#: it is found, as a share of the step that passes it, as of points of a curve
-_ALIKE, _FORETOLD = 0.5, 0.4
+#: cosine of the directions of two odd parts that are one, at least
+_ALIKE = 0.5
+#: distance, as a share of the step that passes a doubling, between where it is foretold and where it is found, at most
+_FORETOLD = 0.4
 #: halvings of a step towards the place at which the odd part vanishes: Newton's method does the rest
 _HALVED = 20
 #: share of a motion by which the first or last motion of a branch may differ from that of the bifurcation beside it

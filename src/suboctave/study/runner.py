@@ -270,8 +270,8 @@ def analysed(
         outcome = error.result if isinstance(error.result, Branch) else None
     except (ConvergenceError, InputError) as error:
         failure, wrong = str(error), isinstance(error, InputError)
-    except ArithmeticError as error:  # a size of 1e200 whose square is no number
-        failure = f"the numbers grew too large or too small ({error}): choose units in which they are nearer to 1"
+    except OverflowError as error:  # a size of 1e200 whose square is no number
+        failure = f"the numbers grew too large ({error}): choose units in which they are nearer to 1"
     except Exception as error:
         last = traceback.extract_tb(error.__traceback__)[-1]
         place = f"{Path(last.filename).name}, line {last.lineno}"

@@ -26,11 +26,15 @@ from suboctave.harmonic.truncation import next_harmonics
 #: distance of a located bifurcation's critical multiplier from where it should be, and error of it, up to which the
 #: harmonics it was solved with suffice
 CRITICAL = 1e-3
-#: first way along the curve, in scaled arclength, and the farthest at which the zero is looked for
-_FIRST, _FARTHEST = 1e-4, 0.1
-#: places that are tried, and distance of two, as a share of that from the bifurcation solved for, that settles the zero
-_TRIED, _SETTLED = 12, 1e-2
-#: distance of two places that settles it anyway
+#: scaled arclength of the first secant
+_FIRST = 1e-4
+#: scaled arclength from the bifurcation solved for beyond which a zero belongs to another one
+_FARTHEST = 0.1
+#: number of places at which the scalar is evaluated before the search is given up
+_PLACES = 12
+#: last step of the secants that settles the zero, as a share of its distance from the bifurcation solved for
+_SETTLED = 1e-2
+#: last step, in scaled arclength, that settles a zero which lies at the bifurcation solved for
 _CLOSE = 1e-9
 
 
@@ -101,7 +105,7 @@ def zero_beside(
     scalar = _SCALARS[kind.name]
     places, values, parameters = [0.0], [scalar(motion, result, critical)], [motion.parameter]
     way = _FIRST
-    for _ in range(_TRIED):
+    for _ in range(_PLACES):
         if abs(way) > _FARTHEST:
             return None
         motion = motion.beside(way - places[-1])
