@@ -53,8 +53,8 @@ def test_eight_threads_give_what_one_gives():
     computations = [
         lambda: points(so.frequency_response(stops, (0.6, 0.8), harmonics=7)),
         lambda: points(so.frequency_response(absorber, (0.95, 1.12), harmonics=5)),
-        lambda: points(so.track(fold, "p", (0.5, 0.6))),
-        lambda: points(so.track(doubling, "p", (0.5, 0.6))),
+        lambda: points(so.track(fold, "p", (0.54, 0.57))),
+        lambda: points(so.track(doubling, "p", (0.54, 0.57))),
         lambda: so.integrate(stops, omega=1.0, periods=5).displacement,
         lambda: so.lyapunov_exponents(stops, omega=1.0, transient=5, periods=10).exponents,
     ]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 from slow import slow
@@ -73,22 +75,28 @@ def kinds(curve):
     return [item.kind for item in curve.bifurcations if item.kind in ("LP", "BP")]
 
 
-@pytest.mark.parametrize("name", SYMMETRIC)
-def test_a_pitchfork_is_one_branch_point_from_the_unsymmetric_motions(name):
-    """They turn back exactly there and go on as their own mirror images: one BP, and no limit point."""
+@cache
+def pitchfork(name):
+    """A system's branch point, and a motion of the branch that leaves there."""
     make, omega, near = SYMMETRIC[name]
-    system = make()
-    item = branch_point(system, omega, near)
-    orbit = unsymmetric(item, 0.01)
+    item = branch_point(make(), omega, near)
+    return item, unsymmetric(item, 0.01)
+
+
+@pytest.mark.parametrize("max_step", [0.06, 0.3, *slow(0.02)])
+@pytest.mark.parametrize("name", SYMMETRIC)
+def test_a_pitchfork_is_one_branch_point_from_the_unsymmetric_motions(name, max_step):
+    """They turn back exactly there and go on as their own mirror images: one BP, and no limit point."""
+    item, orbit = pitchfork(name)
+    system = orbit.system
     ends = (orbit.omega, item.omega - 0.5 * (orbit.omega - item.omega))
-    for max_step in (0.02, 0.06, 0.3):
-        there = so.frequency_response(system, ends, start=orbit, max_step=max_step)
-        back = so.frequency_response(system, ends, start=there.orbits[-1], max_step=max_step)
-        for curve in (there, back):
-            assert kinds(curve) == ["BP"]
-            assert curve.bifurcations["BP"][0].omega == pytest.approx(item.omega, abs=3e-7)
-            assert curve.omega[-1] == pytest.approx(orbit.omega)
-            assert curve.audit.complete
+    there = so.frequency_response(system, ends, start=orbit, max_step=max_step)
+    back = so.frequency_response(system, ends, start=there.orbits[-1], max_step=max_step)
+    for curve in (there, back):
+        assert kinds(curve) == ["BP"]
+        assert curve.bifurcations["BP"][0].omega == pytest.approx(item.omega, abs=3e-7)
+        assert curve.omega[-1] == pytest.approx(orbit.omega)
+        assert curve.audit.complete
 
 
 @pytest.mark.parametrize("max_step", [0.06, 0.3, *slow(0.02, 0.04, 0.08, 0.15)])
@@ -127,7 +135,7 @@ def test_an_imperfect_pitchfork_is_a_limit_point_beside_a_smooth_curve():
     orbit = unsymmetric(item)
     mirrored = so.frequency_response(cubic(), (orbit.omega, 0.78), start=orbit).orbits[-1]
     distances = []
-    for share in (1e-3, 1e-5, 1e-7, 1e-9):
+    for share in (1e-5, 1e-7, 1e-9):
         system = cubic(7.5 * share)
         curves = [so.frequency_response(system, (orbit.omega, 0.78), start=s.coefficients) for s in (orbit, mirrored)]
         turning = next(curve for curve in curves if curve.omega[-1] > 0.8)
@@ -139,7 +147,7 @@ def test_an_imperfect_pitchfork_is_a_limit_point_beside_a_smooth_curve():
             assert fold.omega == pytest.approx(shot(system, fold), abs=1e-7)
         distances.append(fold.omega - item.omega)
     slopes = np.diff(np.log(distances)) / np.log(1e-2)
-    assert slopes[1:] == pytest.approx(2.0 / 3.0, abs=0.01)
+    assert slopes == pytest.approx(2.0 / 3.0, abs=0.01)
 
 
 def test_a_fold_that_cannot_be_solved_is_in_doubt_and_not_in_the_list(monkeypatch):

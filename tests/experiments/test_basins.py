@@ -25,7 +25,7 @@ def found():
 def test_labels_are_what_long_integration_finds(found):
     x, y = np.meshgrid(found.x, found.y)
     states = np.column_stack([x.ravel(), y.ravel()])
-    sections = so.poincare_sections(DUFFING, start=states, omega=1.5, transient=400, periods=6)
+    sections = so.poincare_sections(DUFFING, start=states, omega=1.5, transient=200, periods=6)
     ends = np.array([sections.attractor(i).amplitude for i in range(len(states))])
     said = np.array([found.attractors[i].amplitude for i in found.labels.ravel()])
     assert np.abs(ends / said - 1.0).max() < 1e-3
@@ -60,8 +60,8 @@ def test_a_plane_of_two_degrees_of_freedom():
         loads=[so.HarmonicLoad(0, amplitude=0.3), so.HarmonicLoad(1, amplitude=0.2)],
     )  # fmt: skip
     rest = [0.0, 0.7, 0.0, -0.4]
-    both = so.basins(system, omega=1.5, box=BOX, grid=(12, 10), plane=("x_0", "v_0"), start=rest)
-    alone = so.basins(DUFFING, omega=1.5, box=BOX, grid=(12, 10))
+    both = so.basins(system, omega=1.5, box=BOX, grid=(8, 6), plane=("x_0", "v_0"), start=rest)
+    alone = so.basins(DUFFING, omega=1.5, box=BOX, grid=(8, 6))
     first = np.vectorize(lambda i: both.attractors[i].amplitude)(both.labels)
     second = np.vectorize(lambda i: alone.attractors[i].amplitude)(alone.labels)
     assert np.allclose(first, second, rtol=1e-6)
@@ -70,7 +70,6 @@ def test_a_plane_of_two_degrees_of_freedom():
 
 def test_goes_on_after_a_kill(tmp_path, monkeypatch, found):
     monkeypatch.setattr(basin_run, "_CHUNK", 100)
-    whole = so.basins(DUFFING, omega=1.5, box=BOX, grid=(30, 24), keep=tmp_path / "whole")
     settle, calls = basin_run.BasinRun._settle, []
 
     def interrupted(self, states, told):
@@ -88,10 +87,9 @@ def test_goes_on_after_a_kill(tmp_path, monkeypatch, found):
     again = so.basins(DUFFING, omega=1.5, box=BOX, grid=(30, 24), keep=tmp_path / "kept")
     assert len(calls) == 10 + 5  # only what was missing
     assert again.complete
-    assert np.array_equal(again.labels, whole.labels)
-    assert np.array_equal(again.settling, whole.settling)
-    assert [one.name for one in again.attractors] == [one.name for one in whole.attractors]
     assert np.array_equal(again.labels, found.labels)
+    assert np.array_equal(again.settling, found.settling)
+    assert [one.name for one in again.attractors] == [one.name for one in found.attractors]
     with pytest.raises(InputError, match="other basins"):
         so.basins(DUFFING, omega=1.51, box=BOX, grid=(30, 24), keep=tmp_path / "kept")
 

@@ -207,7 +207,7 @@ def test_wrong_input_to_a_diagram_is_refused(oscillator):
 
 
 def test_pictures_show_every_period(oscillator, tmp_path):
-    diagram = so.brute_force_diagram(oscillator, (2.0, 2.4), values=4, start=GRID[::7], transient=600, periods=6)
+    diagram = so.brute_force_diagram(oscillator, (2.0, 2.4), values=4, start=GRID[::7], transient=200, periods=6)
     curve = so.frequency_response(oscillator, omega=(2.0, 2.4), harmonics=9)
     figure = diagram.plot(tmp_path / "over.png", curves=curve)
     drawn = {line.get_gid() for line in figure.axes[0].lines}

@@ -122,7 +122,7 @@ def test_a_bifurcation_point_stays_undecided_and_says_why(doubling):
     assert [w.method for w in found.witnesses] == ["monodromy", "Hill"]
 
 
-@pytest.mark.parametrize("count", [10, *slow(40)])
+@pytest.mark.parametrize("count", [5, *slow(40)])
 def test_roots_beside_multipliers_are_those_of_shooting(random_motions, count):
     """Whatever the monodromy matrix leaves open: the root beside it is within its own estimate of the truth."""
     asked, answered = 0, 0

@@ -49,7 +49,7 @@ def test_a_regime_map(regimes, tmp_path):
         assert len(motions) >= 1
         for one, other in zip(motions, loaded.motions(omega, value), strict=True):
             assert one.coefficients.tobytes() == other.coefficients.tobytes()
-    options = {"points": 2, "seed": 1, "states": 1, "transient": 50}
+    options = {"points": 1, "seed": 1, "starts": 1, "transient": 50}
     assert repr(loaded.check(**options)) == repr(regimes.check(**options))
     with pytest.raises(so.InputError, match="exists"):
         regimes.save(file)

@@ -32,6 +32,9 @@ def found():
         harmonics=3,
         search=(3,),
         values=[5.0],
+        seeds=so.Seeds(4, 2, 1),
+        depth=0,
+        levels=(),
         stability=so.Hill(),
         max_step=0.2,
     )

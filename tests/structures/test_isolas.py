@@ -38,7 +38,7 @@ def beam(elements=100):
 
 @pytest.fixture(scope="module")
 def of_chain():
-    return so.find_isolas(chain(), (1.9, 3.0), "j", (0.16, 0.3), harmonics=15, values=2)
+    return so.find_isolas(chain(), (1.9, 3.0), "j", (0.16, 0.3), harmonics=15, values=2, levels=(), search=())
 
 
 def test_two_isolas_of_a_chain(of_chain):

@@ -28,7 +28,7 @@ name = "limits"
 type = "track"
 start = {{ analysis = "response", bifurcation = "LP", index = 1 }}
 parameter = "F"
-bounds = [0.05, 0.5]
+bounds = [0.2, 0.4]
 [outputs]
 csv = true
 html = "report.html"

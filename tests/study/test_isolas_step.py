@@ -36,6 +36,8 @@ search = [3]
 harmonics = 3
 at = [4.0, 1.0]
 """
+#: with a few seeds of sub-harmonic motions, and nothing else
+QUICK = ISOLAS + "depth = 0\nlevels = []\nseeds = { frequencies = 4, phases = 2, modes = 1 }\n"
 LATER = """
 [[analyses]]
 name = "witness"
@@ -84,7 +86,7 @@ motions = [{ analysis = "isolas", isola = 0, bifurcation = "isola_centre" }]
 @pytest.fixture(scope="module")
 def ran(tmp_path_factory):
     path = tmp_path_factory.mktemp("isolas") / "study.toml"
-    path.write_text(SYSTEM + ISOLAS + LATER + OUTPUTS, encoding="utf-8")
+    path.write_text(SYSTEM + QUICK + LATER + OUTPUTS, encoding="utf-8")
     return run_study(read_study(path)), path.parent / "study_results"
 
 
@@ -93,7 +95,8 @@ def test_as_by_a_script(ran):
     assert not outcome.failed
     found = so.load(folder / "results.nc")["isolas"]
     study = read_study(folder.parent / "study.toml")
-    isolas = so.find_isolas(study.system, (2.5, 9.0), "F", (0.1, 5.0), harmonics=3, values=[5.0], search=(3,))
+    few = {"depth": 0, "levels": (), "seeds": so.Seeds(4, 2, 1)}
+    isolas = so.find_isolas(study.system, (2.5, 9.0), "F", (0.1, 5.0), harmonics=3, values=[5.0], search=(3,), **few)
     assert found[0].range == pytest.approx(isolas[0].range, rel=1e-9)
     assert found[0].known[4.0].omega == pytest.approx(isolas[0].at(4.0).omega, rel=1e-9)
     assert found.notes == ("no isola was found at F = 1",)
