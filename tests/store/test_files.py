@@ -10,6 +10,7 @@ import pytest
 import xarray as xr
 
 import suboctave as so
+from suboctave.store import files
 from suboctave.store.table import Table
 from suboctave.study.results import Results
 
@@ -133,6 +134,28 @@ def test_xarray_reads_it_without_us(curve, saved):
     np.testing.assert_allclose(x[0] + waves, curve.orbits[i].displacement(t)[0], atol=1e-13)
     assert dataset.attrs["suboctave"] == so.__version__
     assert {"python", "platform", "written", "digest"} <= set(dataset.attrs)
+
+
+def test_every_group_is_what_xarray_reads(saved, tmp_path):
+    """Also without events, and where a variable has the name of a dimension that it does not lie along."""
+    plain = so.frequency_response(so.library.duffing(c=0.1, F=0.3), (3.0, 2.5), harmonics=3)
+    named = xr.Dataset(
+        {"x": ("y", [1.0, 2.0]), "a": ("x", ["one", "", "ü"]), "b": ("x", [True, False, True]), "none": ("z", [])},
+        {"of_x": ("x", [1, 2, 3]), "z": ("z", np.zeros(0))},
+        {"title": "named", "count": 3, "share": 0.5},
+    )
+    path = tmp_path / "several.nc"
+    files.write(path, {"": named, "plain": plain.to_xarray(), "plain/within": named}, {})
+    for file in (saved, path):
+        for name, part in files.read(file).items():
+            with xr.open_dataset(file, group=name or None, engine="h5netcdf") as theirs:
+                xr.testing.assert_equal(part, theirs.load())
+                assert set(part.coords) == set(theirs.coords)
+                for attribute, value in part.attrs.items():
+                    assert theirs.attrs[attribute] == value
+                for key, variable in part.variables.items():
+                    assert variable.attrs == theirs.variables[key].attrs
+                    assert variable.dtype.kind == theirs.variables[key].dtype.kind.replace("U", "O")
 
 
 def test_an_existing_file_is_left_alone(curve, tmp_path):

@@ -23,6 +23,7 @@ import numpy as np
 from suboctave.atomic import replace_file
 from suboctave.errors import InputError, path_of
 from suboctave.store.layout import LAYOUT, check_layout
+from suboctave.store.netcdf import read_group, write_group
 from suboctave.version import __version__
 
 if TYPE_CHECKING:
@@ -34,20 +35,16 @@ _AGAIN = "run the study again, or take a copy that is whole"
 
 def write(path: Path, groups: Mapping[str, xarray.Dataset], attributes: Mapping[str, Any]) -> None:
     """The datasets as groups of one file (the name "" is the root), with attributes on the root."""
+    import h5py
     import xarray
 
     def make(place: Path) -> None:
         root = groups.get("", xarray.Dataset()).assign_attrs(attributes)
-        for name, dataset in {"": root, **{name: part for name, part in groups.items() if name}}.items():
-            stated = dataset.assign_attrs(layout=LAYOUT, suboctave=__version__)
-            stated = stated.assign_attrs(digest=digest(stated))
-            encoding: dict[Any, Any] = {
-                variable: {"_FillValue": None} | ({"zlib": True, "shuffle": True} if values.size > 256 else {})
-                for variable, values in stated.variables.items()
-                if values.dtype.kind not in "OU"
-            }
-            mode: Any = "a" if name else "w"
-            stated.to_netcdf(place, mode=mode, group=name or None, engine="h5netcdf", encoding=encoding)
+        with h5py.File(place, "w") as file:
+            for name, dataset in {"": root, **{name: part for name, part in groups.items() if name}}.items():
+                stated = dataset.assign_attrs(layout=LAYOUT, suboctave=__version__)
+                group = file.require_group(name) if name else file
+                write_group(group, stated.assign_attrs(digest=digest(stated)))
 
     replace_file(path, make)
 
@@ -84,17 +81,12 @@ def read(path: str | Path) -> dict[str, xarray.Dataset]:
 
 def _read_groups(source: Path) -> dict[str, xarray.Dataset]:
     import h5py
-    import xarray
 
     with h5py.File(source, "r") as file:
         check_layout(file.attrs, str(source))
-        names: list[str] = []
-        file.visititems(lambda name, item: names.append(name) if isinstance(item, h5py.Group) else None)
-    groups = {}
-    for name in ["", *names]:
-        with xarray.open_dataset(source, group=name or None, engine="h5netcdf") as dataset:
-            groups[name] = dataset.load()
-    return groups
+        parts: dict[str, h5py.Group] = {"": file}
+        file.visititems(lambda name, item: parts.update({name: item}) if isinstance(item, h5py.Group) else None)
+        return {name: read_group(group) for name, group in parts.items()}
 
 
 def _check(part: str, dataset: xarray.Dataset) -> None:
