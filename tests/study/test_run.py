@@ -506,8 +506,8 @@ def test_functions_that_fail_are_said_on_the_command_line(failing, suboctave):
 @pytest.mark.parametrize(
     ("mistake", "words"),
     [
-        (lambda: {}["nothing"], "nobody has foreseen, please report it: KeyError: 'nothing' (test_run.py"),
-        (lambda: 1 / 0, "nobody has foreseen, please report it: ZeroDivisionError: division by zero (test_run.py"),
+        (lambda: {}["nothing"], "an unexpected error, please report it: KeyError: 'nothing' (test_run.py"),
+        (lambda: 1 / 0, "an unexpected error, please report it: ZeroDivisionError: division by zero (test_run.py"),
         (lambda: 1e200**2, "the numbers grew too large"),
     ],
 )
