@@ -160,7 +160,7 @@ def test_period_doublings_by_other_formulations(formulation):
     k = 2.0 * np.eye(3) - np.eye(3, k=1) - np.eye(3, k=-1)
     elements = [so.ElasticStop(0, 9.0, 0.0), so.CubicSpring(0, 0.1)]
     system = so.System(np.eye(3), 0.03 * k, 2.0 * k, elements, [so.HarmonicLoad(0, 0.5)])
-    full = whole(system, (2.8, 2.2), 9, formulation=formulation).bifurcations["PD"]
+    full = whole(system, (2.8, 2.2), harmonics=9, formulation=formulation).bifurcations["PD"]
     small = so.frequency_response(system, (2.8, 2.2), harmonics=9, formulation=formulation).bifurcations["PD"]
     default = so.frequency_response(system, (2.8, 2.2), harmonics=9).bifurcations["PD"]
     assert len(default) == 2
