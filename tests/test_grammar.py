@@ -31,6 +31,7 @@ COMPUTING = VERBS.keys() - PICTURES - FILES
 MOMENTARY = {"check_derivatives", "condense", "sensitivity", "stability"}
 #: what verbs take, and systems: what is in these belongs to those who write laws and studies
 TAKEN = {
+    "View",
     "ProjectedSystem",
     "BaseElement",
     "Formulation",

@@ -96,7 +96,9 @@ from .model import (
 from .pictures import (
     animate_shape as animate_shape,
     plot as plot,
+    plot_boundaries as plot_boundaries,
     plot_history as plot_history,
+    plot_panels as plot_panels,
     plot_phase as plot_phase,
     plot_shape as plot_shape,
     plot_space as plot_space,

@@ -27,7 +27,7 @@ from suboctave.kinds import KINDS
 from suboctave.options import with_options
 from suboctave.pictures import strokes, style
 from suboctave.pictures.drawing import Axis, Beads, Drawing, Entry, Frame, Label, Markers, Region, Surface, plain
-from suboctave.pictures.given import datasets_of, is_boundary, is_isolas, named_within, several_of
+from suboctave.pictures.given import datasets_of, drawn_datasets, is_boundary, is_isolas, named_within, several_of
 from suboctave.pictures.options import Coordinates, FrameOptions, SpaceOptions, View
 from suboctave.pictures.paper import finished
 from suboctave.pictures.strokes import Seen, Verdict, add_strokes, checked, events_of, line_through, named_axis, seen_as
@@ -71,7 +71,7 @@ def plot_boundaries(
     Parameters
     ----------
     curves
-        Their datasets; with that of isolas among them the regions of these are shaded in the plane of their
+        Tracked curves, or their datasets; with isolas among them the regions of these are shaded in the plane of their
         parameters, and their ends are marked.
     x, y
         The axes, "omega" or parameters; default: the two that were free.
@@ -84,8 +84,7 @@ def plot_boundaries(
 
     Raises InputError for what cannot be drawn.
     """
-    several: list[Any] = list(curves) if isinstance(curves, list | tuple) else [curves]
-    drawing = boundary_drawing(several, x=x, y=y, labels=labels, view=view, projected=projected)
+    drawing = boundary_drawing(drawn_datasets(curves, view), x=x, y=y, labels=labels, view=view, projected=projected)
     drawing.frames[0].title = plain(options.get("title") or "")
     return finished(drawing, style.sheet_of(options.get("size") or (6.4, 4.2)), path, options)
 

@@ -55,6 +55,15 @@ def datasets_of(curves: Any, view: View) -> list[xarray.Dataset]:
     return [dataset if is_isolas(dataset) else next(drawn) for dataset in datasets]
 
 
+def drawn_datasets(curves: Any, view: View | None) -> list[xarray.Dataset]:
+    """Datasets as they are given, those of results made."""
+    return [
+        dataset
+        for item in several_of(curves)
+        for dataset in ([item] if hasattr(item, "data_vars") else datasets_of(item, view or View()))
+    ]
+
+
 def _seen_at(dataset: xarray.Dataset, one: View, view: View) -> xarray.Dataset:
     """The dataset with what is drawn of one degree of freedom where the view of several looks for it."""
     Coordinates((None,), one).check(dataset)

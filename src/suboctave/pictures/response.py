@@ -17,7 +17,7 @@ from suboctave.options import with_options
 from suboctave.pictures import style
 from suboctave.pictures.boundary import boundary_names, boundary_styles, plot_boundaries
 from suboctave.pictures.drawing import Axis, Drawing, Entry, Frame, Markers, Ticks, plain, spread
-from suboctave.pictures.given import datasets_of, is_boundary, is_isolas, named_within, several_of
+from suboctave.pictures.given import datasets_of, drawn_datasets, is_boundary, is_isolas, named_within, several_of
 from suboctave.pictures.options import Coordinates, CurveOptions, FrameOptions, View, symbol_of_dof
 from suboctave.pictures.paper import draw, dress, finished, handles
 from suboctave.pictures.strokes import (
@@ -60,7 +60,9 @@ def plot_response(
     several curves apart (default: the parameters in which they differ). `view`: the quantity drawn and the units
     (default: amplitude, as it is).
     """
-    drawing = response_drawing([_as_list(curves)], x=x, labels=None if labels is None else [labels], view=view)
+    drawing = response_drawing(
+        [checked(drawn_datasets(curves, view))], x=x, labels=None if labels is None else [labels], view=view
+    )
     drawing.frames[0].title = plain(options.get("title") or "")
     return finished(drawing, style.sheet_of(options.get("size") or (6.4, 4.2)), path, options)
 
@@ -78,10 +80,10 @@ def plot_panels(
 ) -> Figure:
     """Several frames side by side on the same axes, with one legend for all of them.
 
-    Each entry of `panels` is what `plot_response` takes; `labels` and `titles` have one entry for each panel. Saved
-    to `path` where one is given.
+    Each entry of `panels` is one curve, or a list of those of one frame; `labels` and `titles` have one entry for each
+    panel. Saved to `path` where one is given.
     """
-    groups = [_as_list(panel) for panel in panels]
+    groups = [checked(drawn_datasets(panel, view)) for panel in panels]
     for name, given in (("labels", labels), ("titles", titles)):
         check_count(name, given, len(groups), "panels")
     wide = 6.4 if len(groups) == 1 else 1.0 + 4.2 * len(groups)

@@ -45,6 +45,7 @@ from suboctave.model.elements.derivative_check import DerivativeReport as Deriva
 from suboctave.model.frequencies import NaturalFrequencies as NaturalFrequencies
 from suboctave.model.modes import Modes as Modes
 from suboctave.model.projected import ProjectedSystem as ProjectedSystem
+from suboctave.pictures.options import View as View
 from suboctave.results.branch import Branch as Branch, TrackedBranch as TrackedBranch
 from suboctave.results.diagram import BifurcationDiagram as BifurcationDiagram, DiagramBranch as DiagramBranch
 from suboctave.results.equilibria import Equilibria as Equilibria

@@ -16,7 +16,7 @@ from suboctave.analysis.diagram import bifurcation_diagram
 from suboctave.analysis.track import track
 from suboctave.interruption import pass_on
 from suboctave.model import System, library
-from suboctave.pictures import plot_boundaries, plot_panels, plot_response
+from suboctave.pictures import plot, plot_boundaries, plot_panels
 from suboctave.progress import bar
 from suboctave.results.branch import Branch
 from suboctave.store.layout import events_met
@@ -61,10 +61,10 @@ def draw(curves: Sequence[Branch], folder: Path) -> list[Path]:
     """Two figures in `folder`, PNG: weak forcing with its two cases side by side, and strong forcing."""
     weak, strong = folder / "weak_forcing.png", folder / "strong_forcing.png"
     titles = [f"({letter}) {case}" for letter, case in zip("ab", CASES, strict=False)]
-    plot_panels([curve.to_xarray() for curve in curves[:2]], weak, titles=titles[: len(curves)])
+    plot_panels(curves[:2], weak, titles=titles[: len(curves)])
     if len(curves) < len(CASES):
         return [weak]
-    plot_response(curves[2].to_xarray(), strong, title=str(CASES[2]))
+    plot(curves[2], strong, title=str(CASES[2]))
     return [weak, strong]
 
 
@@ -87,14 +87,14 @@ def sequel(weak: Branch, strong: System, folder: Path, progress: Progress | None
     pass_on(border.interruption)
     limits = track(border.bifurcations["GPD"][-1], **gaps)
     pass_on(limits.interruption)
-    plot_boundaries([border.to_xarray(), limits.to_xarray()], boundary)
+    plot_boundaries([border, limits], boundary)
     highest, born = (max(e.parameter("j") for e in curve.extrema) for curve in (border, limits))
 
     fold = min(limits.orbits, key=lambda orbit: abs(orbit.values["j"] - 0.5))
     gap = fold.values["j"]
     isola = continue_branch(fold, "omega", OMEGA, progress=progress)
     response = frequency_response(weak.system.with_parameters({"j": gap}), omega=OMEGA, progress=progress)
-    plot_response([response.to_xarray(), isola.to_xarray()], hidden, title=f"p = 0.55, j = {gap:.3f}")
+    plot([response, isola], hidden, title=f"p = 0.55, j = {gap:.3f}")
     beside = f"an isolated resonance of twice the period hides beside it: at j = {gap:.3f}"
     return [
         (leaving, cascade),
