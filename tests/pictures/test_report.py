@@ -86,14 +86,11 @@ def test_figures_hold_the_curve_and_its_bifurcations(page, duffing):
     drawn = {(x, y) for n in ("stable", "unstable") for x, y in zip(by_name[n]["x"], by_name[n]["y"], strict=True)}
     pairs = zip(data["omega"].values, data["amplitude"].values, strict=True)
     assert {(float(f"{x:.9g}"), float(f"{y:.9g}")) for x, y in pairs} <= drawn
-    # between two stable strokes the line is broken, and so are the texts
+    # between two stable strokes the line is broken, and so are its vertices
     stable = by_name["stable"]
     assert stable["x"].count(None) == 1
-    assert len(stable["text"]) == len(stable["x"])
-    first = stable["text"][0]
-    assert first.startswith("ω = ")
-    assert "amplitude = " in first
-    assert "critical multiplier = 1" in by_name["limit point"]["text"][0]
+    assert len(stable["customdata"]) == len(stable["x"])
+    assert told["axes"] == ["omega", "quantity"]
 
 
 def test_the_table_needs_no_script(page, duffing):
@@ -111,13 +108,13 @@ def test_what_users_write_is_text(duffing, tmp_path):
     path = write_report(results, tmp_path / "evil.html", title=EVIL)
     read = Page(path.read_text(encoding="utf-8"))
     assert "b" not in read.tags
-    assert len(read.scripts) == 3 + 3  # two curves, one overview, their points, Plotly, ours
+    assert len(read.scripts) == 1 + 3  # one figure of two curves, their points, Plotly, ours
     assert not any("alert(" in text for kind, text in read.scripts if kind == "")
     for kind, text in read.scripts:
         if kind == "application/json":
             assert "<" not in text
             for trace in json.loads(text)["data"] if text.startswith("{") else []:
-                for words in (trace["name"], trace["hovertemplate"], *trace["text"]):
+                for words in (trace["name"], trace.get("hovertemplate", "")):
                     assert "<script" not in words
                     assert "<b>" not in words
     assert "".join(read.words).count(EVIL) >= 5
@@ -144,9 +141,10 @@ def test_curves_over_different_parameters_and_tables(page, duffing):
     table = xarray.Dataset({"omega": ("row", [1.0]), "mu": ("row", [0.5 + 0.25j]), "note": ("row", ["fine"])})
     read = page({"a": duffing(), "b": duffing(force=0.2), "c": along, "d": table})
     figures = [json.loads(text) for kind, text in read.scripts if kind == "application/json" and text.startswith("{")]
-    assert [len({t["legendgroup"] for t in f["data"]}) for f in figures[:1]] == [2]
-    assert len(figures) == 1 + 3
-    assert [f["layout"]["xaxis"]["title"]["text"] for f in figures][-1] == "p"
+    # each curve is drawn once: those over one parameter together, each once in the legend
+    assert [[t["name"] for t in f["data"] if t.get("showlegend")] for f in figures] == [["a", "b"], ["motions"]]
+    assert [f["layout"]["xaxis"]["title"]["text"] for f in figures] == ["forcing frequency ω", "p"]
+    assert [f["axes"] for f in figures] == [["omega", "quantity"], ["p", "quantity"]]
     assert {"0.500000 +0.250000i", "fine"} <= set(read.cells)
 
 
@@ -186,7 +184,8 @@ def test_what_was_found_and_what_needs_attention_stands_on_top(page, duffing, tm
     for expected in ("1 curve", f"{data.sizes['point']} points", "2 limit points", "other: failed. no"):
         assert expected in words, expected
     assert "curve: Ended before its end: the step became too small." in words
-    assert "no point was held against time integration" in words
+    assert "None of the points were checked in the time domain" in words
+    assert "time domain" not in words[words.index("What needs attention") :]
     assert EVIL not in summary
     assert '<a href="#curve-0">' in summary
     assert 'id="curve-0"' in text

@@ -147,8 +147,8 @@ def boundary_drawing(
         frame.items += event_markers(dataset, axes, axes.marked(dataset))
     frame.entries |= event_entries(kind for data in group for kind in data["event_kind"].to_numpy()[axes.marked(data)])
     frame.labels = _names_of_events(group, axes)
-    lows_and_highs = zip(axes.labels(group), limits, strict=True)
-    return Drawing([Axis(label, *own) for label, own in lows_and_highs], [frame])
+    each = zip(axes.labels(group), limits, axes.shown, strict=True)
+    return Drawing([Axis(label, *own, shows=shown) for label, own, shown in each], [frame])
 
 
 # --------------------------------------------------------------------------------------------------------------- curves
@@ -387,8 +387,8 @@ def space_drawing(
     marks = [item.role for item in frame.items if isinstance(item, Markers)]
     short = {event_words(kind): style.kind_style(kind).name for kind, _ in kinds}
     frame.entries |= {short.get(name, name): entry for name, entry in event_entries(marks).items()}
-    labels = axes.labels(group)
-    return Drawing([Axis(label, *own) for label, own in zip(labels, limits, strict=True)], [frame])
+    each = zip(axes.labels(group), limits, axes.shown, strict=True)
+    return Drawing([Axis(label, *own, shows=shown) for label, own, shown in each], [frame])
 
 
 def _add_responses(

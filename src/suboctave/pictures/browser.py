@@ -66,8 +66,13 @@ _MATH = ((r"\omega", spelt("omega")), (r"\lambda", "λ"), (r"\delta", "δ"), (r"
 def figure_data(drawing: Drawing, name: str) -> dict[str, Any]:
     """Traces and layout of a drawing of one frame; `name` is that of the file when a reader saves the figure."""
     in_space, frame = len(drawing.axes) == 3, drawing.frames[0]
-    # a legend entry belongs to what is drawn on top
-    shown = {item.name: item for item in sorted(frame.items, key=lambda item: item.layer) if item.name}
+    # a legend entry belongs to what is drawn on top; where curves have several parts, each curve has one, its line
+    together = any(item.group not in ("", item.name) for item in frame.items)
+    shown = {
+        (item.group or item.name) if together else item.name: item
+        for item in sorted(frame.items, key=lambda item: (together and _rank(item), item.layer))
+        if item.name
+    }
     data: list[dict[str, Any]] = []
     # one trace for all strokes of one look and name, and one for every other thing
     traces: dict[Any, list[Item]] = {}
@@ -76,20 +81,29 @@ def figure_data(drawing: Drawing, name: str) -> dict[str, Any]:
         traces.setdefault(key, []).append(item)
     for items in traces.values():
         item = items[0]
+        own = [one for one in items if shown.get((one.group or one.name) if together else one.name) is one]
         entry = {
-            "name": html_of(item.name),
+            "name": html_of((item.group or item.name) if own else item.name),
             "legendgroup": html_of(item.group or item.name),
-            "showlegend": any(shown.get(one.name) is one for one in items),
+            "showlegend": bool(own),
         }
         drawn = _trace(items, drawing.axes, frame)
         if drawn:
             data.append(drawn | entry | _vertices(items))
+    if together:
+        data += [_sample(name, own) for name, own in frame.entries.items() if own.mark is not None or name in _STYLES]
     if any(isinstance(item, Raster) for item in frame.items):
         data += [_patch(name, own) for name, own in frame.entries.items() if own.colour]
     if frame.labels and not in_space:
         data.append(_labels(frame.labels, drawing.axes))
     layout = _space(drawing) if in_space else _plane(drawing)
-    return {"data": data, "layout": layout, "name": name, **({"space": True} if in_space else {})}
+    axes = [axis.shows for axis in drawing.axes]
+    return {"data": data, "layout": layout, "name": name, "axes": axes, **({"space": True} if in_space else {})}
+
+
+def _rank(item: Item) -> int:
+    """Of the parts of a curve the one that stands for it in the legend has the highest: a line, a solid one."""
+    return isinstance(item, Polyline) + (isinstance(item, Polyline) and item.role in ("stable", "border", "curve"))
 
 
 def _vertices(items: Sequence[Item]) -> dict[str, Any]:
@@ -106,6 +120,26 @@ def _patch(name: str, entry: Entry) -> dict[str, Any]:
     """An entry of the legend for cells of one colour, which no trace of their own have."""
     mark = {"symbol": "square", "size": 11, "color": entry.colour, "line": {"color": style.SOFT, "width": 0.5}}
     return {"type": "scatter", "mode": "markers", "x": [None], "y": [None], "name": html_of(name), "marker": mark}
+
+
+#: entries of a legend that are strokes of any curve
+_STYLES = ("unstable", "stability open")
+
+
+def _sample(name: str, entry: Entry) -> dict[str, Any]:
+    """An entry of the legend for what several curves have in common: a kind of marker, a stroke."""
+    look: dict[str, Any] = {"mode": "lines", "line": {"color": style.SOFT, "width": _LINE}}
+    if entry.mark is not None:
+        face = "rgba(0,0,0,0)" if entry.mark.face == "none" else entry.mark.face
+        edge = {"color": entry.mark.edge, "width": _RIM * entry.mark.rim}
+        symbol = SYMBOLS.get(entry.mark.marker, "circle-cross")
+        look = {
+            "mode": "markers",
+            "marker": {"symbol": symbol, "size": _MARK * entry.mark.size, "color": face, "line": edge},
+        }
+    elif entry.pen is not None:
+        look["line"]["dash"] = _dash(entry.pen)
+    return {"type": "scatter", "x": [None], "y": [None], "name": html_of(name), "hoverinfo": "skip", **look}
 
 
 #: cells of a raster that the browser is given, along each side, and how many colours
@@ -172,11 +206,10 @@ def _lines(items: Sequence[Polyline]) -> dict[str, Any]:
     """Strokes, with a gap between one and the next."""
     pen, gap = items[0].pen, np.full((len(items[0].at), 1), np.nan)
     at = np.hstack([part for item in items for part in (item.at, gap)])[:, :-1]
-    texts = [text for item in items for text in [*(item.hover() if item.hover else [""] * item.at.shape[1]), ""]][:-1]
     in_space = len(at) == 3
     width = (_LINE_IN_SPACE if in_space else _LINE) * pen.width
     line = {"color": pen.colour, "width": width, "dash": _dash(pen, "dash" if in_space else "")}
-    return {**_scatter(at, "lines", items[0].name, texts), "connectgaps": False, "line": line}
+    return {**_scatter(at, "lines", items[0]), "connectgaps": False, "line": line}
 
 
 def _markers(item: Markers | Beads, at: np.ndarray) -> dict[str, Any]:
@@ -187,18 +220,16 @@ def _markers(item: Markers | Beads, at: np.ndarray) -> dict[str, Any]:
         look = {"symbol": SYMBOLS.get(mark.marker, "circle-cross"), "size": _MARK * mark.size}
     edge = {"color": mark.edge, "width": _RIM * mark.rim}
     face = "rgba(0,0,0,0)" if mark.face == "none" else mark.face
-    texts = item.hover() if item.hover and item.name else []
-    return {**_scatter(at, "markers", item.name, texts), "marker": {**look, "color": face, "line": edge}}
+    return {**_scatter(at, "markers", item), "marker": {**look, "color": face, "line": edge}}
 
 
-def _scatter(at: np.ndarray, mode: str, name: str, texts: Sequence[str]) -> dict[str, Any]:
-    """A trace through places, (axes, places), with the texts under the mouse."""
+def _scatter(at: np.ndarray, mode: str, item: Item) -> dict[str, Any]:
+    """A trace through places, (axes, places); of vertices of a curve the page knows what it says under the mouse."""
     hover: dict[str, Any] = {"hoverinfo": "skip"}
-    if name or mode == "lines":
-        said = "<br>%{text}" if any(texts) else "<br>%{x:.6g}, %{y:.6g}"
-        template = html_of(name) + said + "<extra></extra>"
-        broken = [html.escape(text).replace("\n", "<br>") for text in texts]
-        hover = {"text": broken, "hovertemplate": template}
+    if item.name or mode == "lines":
+        known = item.curve >= 0 and item.vertices is not None
+        words = "%{text}" if known else "%{x:.6g}, %{y:.6g}"
+        hover = {"hovertemplate": f"{html_of(item.name)}<br>{words}<extra></extra>"}
     return {"type": "scatter3d" if len(at) == 3 else "scatter", "mode": mode, **_coordinates(at), **hover}
 
 

@@ -6,7 +6,7 @@ it down for Plotly. Texts are those of Matplotlib, with formulas between dollar 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
@@ -24,16 +24,14 @@ class _Seen:
     """What everything that is drawn has.
 
     `role`: what it is, in one word; `layer`: higher ones cover lower ones; `name`, `group`: its entry in a legend of
-    the browser, and what is hidden with it; `hover()`, (vertices,): what is said of each vertex under the mouse;
-    `curve`, `vertices`: the number that the curve has on a page (its attribute `number`), -1 without one, and which
-    point each vertex is, or -1 - e for event e, (vertices,).
+    the browser, and what is hidden with it; `curve`, `vertices`: the number that the curve has on a page (its attribute
+    `number`), -1 without one, and which point each vertex is, or -1 - e for event e, (vertices,).
     """
 
     role: str = ""
     layer: float = 3.0
     name: str = ""
     group: str = ""
-    hover: Callable[[], Sequence[str]] | None = None
     curve: int = -1
     vertices: np.ndarray | None = None
 
@@ -173,13 +171,16 @@ class Ticks:
 
 @dataclass(frozen=True)
 class Axis:
-    """One axis: what it says, from where to where (None: what is drawn decides), its scale and ticks."""
+    """One axis: what it says, from where to where (None: what is drawn decides), its scale and ticks; `shows`: "omega",
+    a parameter, or "quantity" of curves.
+    """
 
     label: str
     low: float | None = None
     high: float | None = None
     logarithmic: bool = False
     ticks: Ticks | None = None
+    shows: str = ""
 
 
 @dataclass

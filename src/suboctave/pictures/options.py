@@ -360,6 +360,11 @@ class Coordinates:
     view: View
 
     @property
+    def shown(self) -> list[str]:
+        """What each axis shows: "omega", a parameter, or "quantity"."""
+        return [name or "quantity" for name in self.names]
+
+    @property
     def factors(self) -> np.ndarray:
         """What values along the axes are multiplied by, (axes,)."""
         view = self.view

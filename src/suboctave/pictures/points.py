@@ -19,11 +19,14 @@ from suboctave.pictures.given import is_boundary
 from suboctave.pictures.strokes import number_of
 from suboctave.pictures.style import period_of
 from suboctave.store.layout import coordinate
+from suboctave.units import UnitSystem
 
 if TYPE_CHECKING:
     import xarray
 
 
+#: steps from zero to the largest force of an element in one period
+_STEPS = 32767
 #: multipliers of a point that are shown, by falling modulus
 _MULTIPLIERS = 24
 
@@ -35,6 +38,53 @@ class Verified:
     points: dict[int, str] = field(default_factory=dict)
     events: dict[int, str] = field(default_factory=dict)
     wrong: int = 0
+
+
+@dataclass(frozen=True)
+class Detail:
+    """What of motions is on a page: of which displacements, "all", "read" (the observed one and those that gaps are
+    places of) or "none", and whether the forces of elements over time; `words`: what is not.
+    """
+
+    words: str
+    displacements: str
+    forces: bool
+
+    def of(self, dataset: xarray.Dataset) -> xarray.Dataset:
+        """The dataset of a curve without the rest."""
+        if "motion" not in dataset:
+            return dataset
+        if not self.forces:
+            dataset = dataset.drop_vars(["force", "event_force"])
+        if self.displacements == "none":
+            return dataset.drop_vars(["motion", "event_motion"])
+        if self.displacements == "read":
+            gaps = dataset["gap_signal"].to_numpy()
+            kept = np.unique([0, *gaps])
+            left = int(np.sum(np.delete(dataset["signal_dof"].to_numpy(), kept) >= 0))
+            dataset = dataset.isel(signal=kept).assign(gap_signal=("gap", np.searchsorted(kept, gaps)))
+            dataset = dataset.assign_attrs(dofs_left_out=int(dataset.attrs["dofs_left_out"]) + left)
+        return dataset
+
+    def size(self, dataset: xarray.Dataset) -> float:
+        """Characters of motions and forces on the page."""
+        own, count = self.of(dataset), 0
+        if "motion" in own:
+            sizes = (np.sum(2 * own[f"{prefix}harmonics"].to_numpy() + 1) for prefix in ("", "event_"))
+            count += 4 * own.sizes["signal"] * int(sum(sizes))
+        if "force" in own:
+            count += 2 * (own["force"].size + own["event_force"].size)
+        return 4.0 * count / 3.0
+
+
+_MANY = "There are too many points for all of their motions: this page has"
+#: from all of it to nothing
+DETAILS = (
+    Detail("", "all", True),
+    Detail(f"{_MANY} no forces of elements over time.", "all", False),
+    Detail(f"{_MANY} the observed displacements and those at gaps, no others, and no forces over time.", "read", False),
+    Detail(f"{_MANY} numbers only.", "none", False),
+)
 
 
 def curve_data(dataset: xarray.Dataset, name: str, verified: Verified | None = None) -> dict[str, Any]:
@@ -51,11 +101,8 @@ def curve_data(dataset: xarray.Dataset, name: str, verified: Verified | None = N
         "free": list(free),
         "tracked": kind_of(dataset) if is_boundary(dataset) else "",
         "nu": period_of(dataset),
-        "units": {
-            name: str(dataset[name].attrs.get("units", "")) if dataset.attrs.get("units") else ""
-            for name in ("omega", "amplitude")
-        },
-        "dof": int(dataset.attrs.get("observed_dof", 0)) if int(dataset.attrs.get("dofs", 1)) > 1 else None,
+        "units": _units(dataset),
+        **_signals(dataset),
         "fixed": {one: float(values[one][0][0]) for one in names if one not in varied},
         "points": _places(dataset, "", {one: values[one][0] for one in varied}),
         "events": {
@@ -68,6 +115,7 @@ def curve_data(dataset: xarray.Dataset, name: str, verified: Verified | None = N
             "uncertainty": _finite(dataset["event_uncertainty"].to_numpy()),
         },
         "gaps": _gaps(dataset),
+        "instants": {"count": dataset.sizes.get("instant", 0)},
         "verified": {str(index): words for index, words in verified.points.items()},
         "verified_events": {str(index): words for index, words in verified.events.items()},
     }
@@ -126,15 +174,47 @@ def _places(dataset: xarray.Dataset, prefix: str, values: dict[str, np.ndarray])
         own = [row[:, :size].ravel() for row, size in zip(table, sizes, strict=True)]
         data["motion"] = packed(np.concatenate([np.zeros(0), *own]), "<f4")
         data["levels"] = packed(dataset[f"{prefix}gap_level"].to_numpy())
+    if f"{prefix}force" in dataset:
+        force = dataset[f"{prefix}force"].to_numpy()
+        sizes = np.abs(force).max(axis=-1, initial=0.0)
+        whole = np.where(sizes > 0.0, sizes, 1.0)[..., None]
+        data |= {"force": packed(np.rint(force / whole * _STEPS), "<i2"), "force_sizes": packed(sizes)}
+    if f"{prefix}motion" in dataset:
+        indices = dataset["element_index"].to_numpy().tolist()
+        peaks = [dataset[f"{prefix}peak_force_{index}"].to_numpy() for index in indices]
+        data["peaks"] = packed(np.reshape(np.transpose(peaks), (count, len(indices))))
     return data
 
 
 def _gaps(dataset: xarray.Dataset) -> dict[str, Any]:
     """Where contact begins: which displacement counts, on which side there is contact, of which element."""
     if "motion" not in dataset:
-        return {"signals": 1, "signal": [], "side": [], "label": []}
-    own = {name: dataset[f"gap_{name}"].to_numpy().tolist() for name in ("signal", "side", "label")}
-    return {"signals": dataset.sizes["signal"], **own}
+        return {"signal": [], "side": [], "label": []}
+    return {name: dataset[f"gap_{name}"].to_numpy().tolist() for name in ("signal", "side", "label")}
+
+
+def _units(dataset: xarray.Dataset) -> dict[str, str]:
+    """The declared units by what they are of; nothing where none are declared."""
+    units = UnitSystem.of(str(dataset.attrs.get("units", "")))
+    if units is None:
+        return {}
+    own = {"omega": units.frequency, "cycles": units.cycles}
+    return own | {name: getattr(units, name) for name in ("length", "force", "time")}
+
+
+def _signals(dataset: xarray.Dataset) -> dict[str, Any]:
+    """The displacements and the elements whose motions and forces the page has, by name; how many DOFs it has not."""
+    observed, dofs = (int(dataset.attrs.get(name, i)) for i, name in enumerate(("observed_dof", "dofs")))
+    labels, numbers, elements = (
+        [str(dataset.attrs.get("dof_name", "x" if dofs == 1 else f"x_{observed}"))],
+        [observed],
+        [],
+    )
+    if "signal_label" in dataset:
+        labels, numbers = (dataset[f"signal_{name}"].to_numpy().tolist() for name in ("label", "dof"))
+        elements = [str(label) for label in dataset["element_label"].to_numpy()]
+    signals = [{"label": label, "dof": dof} for label, dof in zip(labels, numbers, strict=True)]
+    return {"signals": signals, "elements": elements, "left_out": int(dataset.attrs.get("dofs_left_out", 0))}
 
 
 def packed(values: np.ndarray, kind: str = "<f8") -> str:

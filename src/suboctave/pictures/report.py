@@ -11,110 +11,45 @@ from __future__ import annotations
 import base64
 import functools
 import gzip
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from suboctave.arguments import checked
 from suboctave.atomic import free_place, replace_file
 from suboctave.errors import InputError, shortened
 from suboctave.pictures import style
-from suboctave.pictures.boundary import boundary_drawing, boundary_names, kind_of, parameter_of, plane_of, space_drawing
-from suboctave.pictures.browser import figure_data
-from suboctave.pictures.drawing import Drawing, Polyline
 from suboctave.pictures.given import is_boundary, is_isolas
-from suboctave.pictures.paper import drawing_of, figure_of, image_of
-from suboctave.pictures.points import Verified, curve_data, verified_by
-from suboctave.pictures.response import response_drawing
-from suboctave.pictures.strokes import hover_of, number_of, spelt
-from suboctave.pictures.style import Pen, period_of
-from suboctave.pictures.tables import (
-    Table,
-    bifurcations,
-    columns_of,
-    isolas_table,
-    notes_on,
-    notes_on_isolas,
-    origin_of,
-    records_of,
-    summary_of,
-)
-from suboctave.store.layout import check_layout, coordinate
+from suboctave.pictures.points import DETAILS, Verified, curve_data, verified_by
+from suboctave.pictures.sections import Contents, Section, anchor_of, has_points, is_empty, pictured, sections_of
+from suboctave.pictures.strokes import number_of
+from suboctave.pictures.tables import bifurcations, notes_on, notes_on_isolas, origin_of, records_of, summary_of
+from suboctave.store.layout import check_layout
 from suboctave.version import __version__
 
 if TYPE_CHECKING:
     import xarray
 
 
-#: inches of a still picture in the plane and in space
-_SIZE, _SIZE_IN_SPACE = (6.4, 4.2), (6.4, 4.8)
+#: curves with one note that are named
+_NAMED = 4
+#: characters of motions and forces on a page; beyond it fewer of them are on it
+_MOST = 12e6
 
 
-@dataclass(frozen=True)
-class Figure:
-    """One figure: data for the browser, None where it is a still picture only; this (SVG, base64); and words for those
-    who see neither.
+@dataclass
+class Found(Contents):
+    """The results of a study as the page shows them.
+
+    `curves_known`: what is known of each numbered curve, ready for JSON; `verified`: what shooting said of it;
+    `left_out`: what the page does not hold, in words.
     """
 
-    data: dict[str, Any] | None
-    still: str
-    words: str
-
-
-@dataclass(frozen=True)
-class Curve:
-    """A curve on the page: heading, figure, its dataset, and where it stands."""
-
-    heading: str
-    figure: Figure
-    dataset: xarray.Dataset
-
-    @property
-    def anchor(self) -> str:
-        """Where links lead to."""
-        return f"curve-{number_of(self.dataset)}"
-
-
-@dataclass
-class Section:
-    """A part of the page: sentences before and after a table, notes, figures, a tree of branches, and curves."""
-
-    heading: str
-    anchor: str = ""
-    before: Sequence[str] = ()
-    table: Table | None = None
-    after: Sequence[str] = ()
-    notes: Sequence[str] = ()
-    figures: Sequence[Figure] = ()
-    tree: str = ""
-    curves: Sequence[Curve] = ()
-
-
-@dataclass
-class Found:
-    """The results of a study as the page shows them: their datasets by name, pictures of what is no curve, checks."""
-
-    datasets: dict[str, dict[str, xarray.Dataset]] = field(default_factory=dict)
-    pictures: dict[str, Figure] = field(default_factory=dict)
     checks: list[xarray.Dataset] = field(default_factory=list)
-    #: what is known of each numbered curve, ready for JSON, and what shooting said of it
-    curves: list[dict[str, Any]] = field(default_factory=list)
+    curves_known: list[dict[str, Any]] = field(default_factory=list)
     verified: dict[int, Verified] = field(default_factory=dict)
-
-    @property
-    def alone(self) -> dict[str, xarray.Dataset]:
-        """The curves and tables that are all of a result."""
-        return {name: own[""] for name, own in self.datasets.items() if list(own) == [""]}
-
-    @property
-    def every(self) -> list[xarray.Dataset]:
-        """All datasets, in their order."""
-        return [dataset for own in self.datasets.values() for dataset in own.values()]
+    left_out: str = ""
 
 
 @checked
@@ -161,35 +96,32 @@ def write_report(
 def page_of(results: Mapping[str, Any], title: str, failures: Mapping[str, str] | None = None) -> str:
     """The text of the page that `write_report` writes."""
     found = _found(results)
-    anchors = {name: f"part-{index}" for index, name in enumerate(found.datasets)}
-    sections = list(_overviews({name: data for name, data in found.alone.items() if _has_points(data)}))
-    for name, item in zip(found.datasets, results.values(), strict=True):
-        section = _section(name, found, item)
-        section.anchor = anchors[name]
-        sections.append(section)
+    sections = list(sections_of(found, {str(name): item for name, item in results.items()}))
+    for index, section in enumerate(sections):
+        section.anchor = f"part-{index}"
+    anchors = {name: section.anchor for section in sections for name in section.names}
+    # of one among several in a section the curve itself
+    anchors |= {name: anchor_of(found.curves[name]) for s in sections if len(s.names) > 1 for name in s.names}
     versions = sorted({str(data.attrs["suboctave"]) for data in found.every if "suboctave" in data.attrs})
     systems = dict.fromkeys(str(data.attrs["system"]) for data in found.every if data.attrs.get("system"))
     text: str = template("page.html").render(
         title=title,
         version=__version__,
         origin=" · ".join([f"suboctave {', '.join(versions) or __version__}", *systems]),
-        links=[(anchors[name], name) for name in found.datasets] if len(found.datasets) > 1 else [],
+        links=[(anchors[name], name) for name in found.datasets if name in anchors] if len(anchors) > 1 else [],
         counts=_counts(found, anchors),
+        nothing=[_nothing(name, own) for name, own in found.datasets.items() if name not in anchors],
+        verification=_verification(found),
+        left_out=found.left_out,
         attention=[
             *((f"analysis {name}: failed. {why}", "") for name, why in (failures or {}).items()),
             *_attention(sections, found),
         ],
         sections=sections,
-        curves=found.curves,
+        curves=found.curves_known,
         plotly=_plotly() if any(section.figures or section.curves for section in sections) else "",
     )
     return text
-
-
-def picture_of(curves: Sequence[xarray.Dataset]) -> str:
-    """Response curves as a still picture (SVG, base64)."""
-    drawing = response_drawing([list(curves)])
-    return base64.b64encode(image_of(figure_of(drawing, style.sheet_of(_SIZE)), "svg")).decode("ascii")
 
 
 @functools.cache
@@ -217,24 +149,28 @@ def _plotly() -> str:
 def _found(results: Mapping[str, Any]) -> Found:
     """The datasets of all results, every curve with points numbered; pictures of what is no curve."""
     found = Found()
+    numbered: list[tuple[xarray.Dataset, str]] = []
     for name, item in results.items():
-        found.datasets[str(name)] = _datasets(str(name), item)
+        found.datasets[str(name)] = own = _datasets(str(name), item)
         # of a table what it was taken from; maps and results in time are both
         whole: Any = getattr(item, "result", None) or (item if hasattr(item, "to_table") else None)
         if hasattr(whole, "plot"):
-            found.pictures[str(name)] = _pictured(str(name), whole)
+            found.pictures[str(name)] = pictured(str(name), whole)
         if hasattr(whole, "bifurcations_frame") and hasattr(whole, "disagreements"):
             found.checks.append(whole.to_xarray())
-    for name, own in found.datasets.items():
         for label, dataset in own.items():
-            if is_isolas(dataset) or not _has_points(dataset):
-                continue
-            number = len(found.curves)
-            own[label] = dataset.assign_attrs(number=number)
-            verified = verified_by(found.checks, dataset)
-            if verified is not None:
-                found.verified[number] = verified
-            found.curves.append(curve_data(own[label], f"{name}, {label}" if label else name, verified))
+            if not is_isolas(dataset) and has_points(dataset):
+                own[label] = dataset.assign_attrs(number=len(numbered))
+                numbered.append((own[label], f"{name}, {label}" if label else str(name)))
+    for number, (dataset, _) in enumerate(numbered):
+        verified = verified_by(found.checks, dataset)
+        if verified is not None:
+            found.verified[number] = verified
+    sizes = (sum(detail.size(dataset) for dataset, _ in numbered) for detail in DETAILS)
+    detail = next(detail for detail, size in zip(DETAILS, sizes, strict=True) if size <= _MOST)
+    found.left_out = detail.words
+    for number, (dataset, name) in enumerate(numbered):
+        found.curves_known.append(curve_data(detail.of(dataset), name, found.verified.get(number)))
     return found
 
 
@@ -263,170 +199,10 @@ def _datasets(name: str, item: Any) -> dict[str, xarray.Dataset]:
     return {str(label): dataset for label, dataset in every.items()}
 
 
-def _has_points(dataset: xarray.Dataset) -> bool:
-    return bool(dataset.sizes.get("point", 0))
-
-
-def _section(name: str, found: Found, item: Any) -> Section:
-    datasets = found.datasets[name]
-    head = next((dataset for dataset in datasets.values() if is_isolas(dataset)), None)
-    curves = {label: dataset for label, dataset in datasets.items() if not is_isolas(dataset)}
-    if head is not None:
-        return _isolas(name, head, curves, found.alone)
-    if list(curves) != [""]:  # all curves in one figure, the tree, and each branch by itself
-        figure = _responses(curves, getattr(item, "legend", None))
-        each = [_curve(label, data, f"{name}, branch {label}") for label, data in curves.items()]
-        return Section(name, figures=[figure], tree=str(item), curves=each)
-    (dataset,) = curves.values()
-    if _has_points(dataset):
-        return Section(name, curves=[_curve(name, dataset)])
-    if "row" not in dataset.sizes and name not in found.pictures:
-        return Section(name, before=["a curve without points"])
-    heading = str(dataset.attrs.get("title", ""))
-    figures = [found.pictures[name]] if name in found.pictures else []
-    table = columns_of(dataset) if "row" in dataset.sizes else None
-    return Section(name, before=[heading] if heading else [], table=table, figures=figures)
-
-
-def _isolas(
-    name: str, head: xarray.Dataset, curves: Mapping[str, xarray.Dataset], others: Mapping[str, xarray.Dataset]
-) -> Section:
-    """Table and sentences; the regions in the plane, closed branches beside the responses at the same parameters, the
-    surfaces on which they lie; each curve by itself.
-    """
-    parameter, figures = parameter_of(head), []
-    bounds = {label: data for label, data in curves.items() if is_boundary(data)}
-    closed = {label: data for label, data in curves.items() if label not in bounds}
-    responses = {
-        n: d for n, d in others.items() if _has_points(d) and not is_boundary(d) and d.attrs["free"] == "omega"
-    }
-    file_name = _file_name([name])
-    if bounds:
-        drawing = boundary_drawing([head, *bounds.values()])
-        _add_sections(drawing, {**closed, **responses}, parameter)
-        figures.append(_figure(drawing, file_name, f"Isolas over ω and {parameter}"))
-    if closed:
-        periods = {int(nu) for nu in head["period"].to_numpy()}
-        own = {k: c for k, c in bounds.items() if kind_of(c) == "LP" and period_of(c) in periods}
-        group = {"isolas": head, **own, **closed}
-        drawing = space_drawing(list(group.values()), x="omega", y=parameter, names=list(group))
-        figures.append(_figure(drawing, f"{file_name}_space", f"Closed branches over ω and {parameter}"))
-        values = {_value(data, parameter) for data in closed.values()}
-        beside = {n: d for n, d in responses.items() if _value(d, parameter) in values}
-        figures.append(_responses({**beside, **closed}, [*beside, *closed]))
-    each = [_curve(label, data, f"{name}, {label}") for label, data in {**bounds, **closed}.items()]
-    sentences, notes = notes_on_isolas(head)
-    texts: dict[str, Any] = {"before": [str(head.attrs.get("said", ""))], "after": sentences, "notes": notes}
-    return Section(name, table=isolas_table(head, closed), figures=figures, curves=each, **texts)
-
-
-def _value(dataset: xarray.Dataset, parameter: str) -> float | None:
-    """The value of a parameter along a curve, to 9 digits; None where it varies, or is none of the curve's."""
-    if parameter not in dataset["parameter"].to_numpy():
-        return None
-    values = coordinate(dataset, parameter)[0]
-    return float(f"{values[0]:.9g}") if np.ptp(values) == 0.0 else None
-
-
-def _add_sections(drawing: Drawing, responses: Mapping[str, xarray.Dataset], parameter: str) -> None:
-    """In a plane of omega and a parameter, the lines along which responses were computed: they lead to these."""
-    frame, (across, upwards) = drawing.frames[0], drawing.axes
-    words = "computed responses"
-    for name, dataset in responses.items():
-        value, omega = _value(dataset, parameter), dataset["omega"].to_numpy()
-        if value is None or upwards.low is None or upwards.high is None or not upwards.low <= value <= upwards.high:
-            continue
-        inside = np.flatnonzero((omega >= (across.low or 0.0)) & (omega <= (across.high or np.inf)))
-        if not inside.size:
-            continue
-        at = np.array([omega[inside], np.full(inside.size, value)])
-        texts = [f"{name}\n{text}" for text in hover_of(dataset)(inside, np.full(inside.size, -1))]
-        own: dict[str, Any] = {"curve": number_of(dataset), "vertices": inside, "group": words}
-        seen: dict[str, Any] = {"role": "section", "layer": 2.0, "name": words, "hover": texts.copy}
-        frame.add(Polyline(at, Pen(style.SOFT, 0.6), **seen, **own), words)
-
-
-def _curve(name: str, dataset: xarray.Dataset, heading: str = "") -> Curve:
-    draw = _boundaries if is_boundary(dataset) else _responses
-    return Curve(heading, draw({name: dataset}), dataset)
-
-
-def _overviews(curves: Mapping[str, xarray.Dataset]) -> Iterator[Section]:
-    """Curves that belong into one figure: responses over one parameter, boundaries of one plane, both in space."""
-    groups: dict[tuple[Any, ...], dict[str, xarray.Dataset]] = {}
-    planes: dict[tuple[str, str], dict[str, xarray.Dataset]] = {}
-    for name, data in curves.items():
-        if is_boundary(data):
-            planes.setdefault(plane_of(data), {})[name] = data
-        else:
-            groups.setdefault((str(data.attrs["free"]), *_observed(data)), {})[name] = data
-    for (free, *_), group in groups.items():
-        if len(group) > 1:
-            yield Section(f"All curves over {spelt(free)}", figures=[_responses(group, list(group))])
-    for (first, second), bounds in planes.items():
-        plane = f"{spelt(first)} and {spelt(second)}"
-        flat = {name: data for group in groups.values() for name, data in group.items()}
-        if len(bounds) > 1 or (bounds and flat):
-            yield Section(f"Boundaries over {plane}", figures=[_boundaries(bounds, flat)])
-        observed = {_observed(data) for data in bounds.values()}
-        near = [g for (free, *seen), g in groups.items() if free in (first, second) and tuple(seen) in observed]
-        if near and len(observed) == 1:
-            every = {**{name: data for group in near for name, data in group.items()}, **bounds}
-            drawing = space_drawing(list(every.values()), x=first, y=second, names=list(every))
-            heading = f"Response curves and boundaries over {plane}"
-            yield Section(heading, figures=[_figure(drawing, _file_name(every), f"{heading}: {', '.join(every)}")])
-
-
-def _observed(dataset: xarray.Dataset) -> tuple[int, int]:
-    return int(dataset.attrs.get("dofs", 1)), int(dataset.attrs.get("observed_dof", 0))
-
-
-# -------------------------------------------------------------------------------------------------------------- figures
-def _responses(curves: Mapping[str, xarray.Dataset], labels: Sequence[str] | None = None) -> Figure:
-    group = list(curves.values())
-    free = str(group[0].attrs["free"])
-    named = None if labels is None else [labels]
-    drawing = response_drawing([group], x=free, labels=named, names=list(curves))
-    return _figure(drawing, _file_name(curves), f"Amplitude over {spelt(free)}: {', '.join(curves)}")
-
-
-def _boundaries(curves: Mapping[str, xarray.Dataset], responses: Mapping[str, xarray.Dataset] | None = None) -> Figure:
-    """Curves of bifurcations in their plane, and the lines along which responses were computed."""
-    group = list(curves.values())
-    kinds, plane = boundary_names(group), " and ".join(map(spelt, plane_of(group[0])))
-    labels = [f"{name}: {kind}" for name, kind in zip(curves, kinds, strict=True)] if len(curves) > 1 else kinds
-    drawing, (first, second) = boundary_drawing(group, labels=labels), plane_of(group[0])
-    if first == "omega":
-        own = {n: data for n, data in (responses or {}).items() if data.attrs["free"] == "omega"}
-        _add_sections(drawing, own, second)
-    return _figure(drawing, _file_name(curves), f"{', '.join(curves)}, over {plane}")
-
-
-def _figure(drawing: Drawing, name: str, words: str) -> Figure:
-    """A drawing for the browser and as a still picture."""
-    sheet = style.sheet_of(_SIZE if len(drawing.axes) == 2 else _SIZE_IN_SPACE)
-    still = base64.b64encode(image_of(figure_of(drawing, sheet), "svg")).decode("ascii")
-    return Figure(figure_data(drawing, name), still, words)
-
-
-def _pictured(name: str, item: Any) -> Figure:
-    """The picture of a map, of basins, ...: for the browser as well where its drawing is known."""
-    with TemporaryDirectory() as folder:  # saved: what is not opens a window at a prompt
-        path = Path(folder) / "picture.svg"
-        drawing = drawing_of(item.plot(path))
-        still = base64.b64encode(path.read_bytes()).decode("ascii")
-    data = None if drawing is None or len(drawing.frames) > 1 else figure_data(drawing, _file_name([name]))
-    return Figure(data, still, f"Picture of {name}")
-
-
-def _file_name(names: Sequence[str] | Mapping[str, Any]) -> str:
-    return re.sub(r"[^\w-]+", "_", "_".join(names))[:60] or "figure"
-
-
 # -------------------------------------------------------------------------------------------------------------- summary
 def _counts(found: Found, anchors: Mapping[str, str]) -> list[tuple[int | str, str, str]]:
     """What was found: how many, of what, and where the first of it stands; maps and the like by name."""
-    curves = [data for data in found.every if _has_points(data) and not is_isolas(data)]
+    curves = [data for data in found.every if has_points(data) and not is_isolas(data)]
     counts: list[tuple[int | str, str, str]] = []
     if curves:
         points = sum(data.sizes["point"] for data in curves)
@@ -442,6 +218,8 @@ def _counts(found: Found, anchors: Mapping[str, str]) -> list[tuple[int | str, s
     for name, own in found.datasets.items():
         for head in filter(is_isolas, own.values()):
             number = int(head.sizes["isola"])
+            if not number:
+                continue
             counts.append((number, "isola" if number == 1 else "isolas", anchors[name]))
     for name in found.pictures:
         counts.append(("", name, anchors[name]))
@@ -457,21 +235,50 @@ def _several(name: str) -> str:
     return f"{name[:-1]}ies" if name.endswith("y") else f"{name}s"
 
 
+def _nothing(name: str, own: Mapping[str, xarray.Dataset]) -> str:
+    """In a line that an analysis found nothing."""
+    head = next(iter(own.values()), None)
+    said = (
+        "" if head is None else str(head.attrs.get("said") or head.attrs.get("title") or head.attrs.get("ended") or "")
+    )
+    return f"{name}: {said or 'nothing'}"
+
+
+def _verification(found: Found) -> str:
+    """How many points were checked in the time domain, in a sentence."""
+    total = sum(data.sizes["point"] for data in found.every if number_of(data) >= 0)
+    checked = sum(len(verified.points) for verified in found.verified.values())
+    if not total:
+        return ""
+    share = "None" if not checked else f"{checked} of {total}"
+    how = ' (the analysis "verify", so.verify)' if not checked else ""
+    return f"{share} of the points {'was' if checked == 1 else 'were'} checked in the time domain{how}."
+
+
 def _attention(sections: Sequence[Section], found: Found) -> Iterator[tuple[str, str]]:
-    """What the reader must know before believing the numbers, each with where it is said at length."""
+    """What the reader must know before believing the numbers, each with where it is said at length; once where several
+    curves have the same note.
+    """
+    notes: dict[str, list[tuple[str, str]]] = {}
     for section in sections:
         for note in section.notes:
-            yield f"{section.heading}: {note}", section.anchor
+            notes.setdefault(note, []).append((section.heading, section.anchor))
         for curve in section.curves:
-            name = found.curves[number_of(curve.dataset)]["name"]
+            name = found.curves_known[number_of(curve.dataset)]["name"]
             for note in notes_on(curve.dataset):
-                yield f"{name}: {note}", curve.anchor
+                notes.setdefault(note, []).append((name, curve.anchor))
+    for name, own in found.datasets.items():
+        for head in filter(is_isolas, own.values()):
+            if is_empty(own):
+                for note in notes_on_isolas(head)[1]:
+                    notes.setdefault(note, []).append((name, ""))
+    for note, places in notes.items():
+        names = [name for name, _ in places]
+        words = (
+            ", ".join(names) if len(names) <= _NAMED else f"{', '.join(names[:_NAMED])} and {len(names) - _NAMED} more"
+        )
+        yield f"{words}: {note}", places[0][1]
     for number, verified in found.verified.items():
         if verified.wrong:
-            yield f"{found.curves[number]['name']}: shooting disagrees at {verified.wrong} places", f"curve-{number}"
-    counts = [(data.sizes["point"], number_of(data)) for data in found.every if number_of(data) >= 0]
-    total = sum(count for count, _ in counts)
-    checked = sum(len(verified.points) for verified in found.verified.values())
-    if total > checked:
-        words = "no point was" if not checked else f"{checked} of {total} points were"
-        yield f'{words} held against time integration (the analysis "verify", so.verify)', ""
+            name = found.curves_known[number]["name"]
+            yield f"{name}: shooting disagrees at {verified.wrong} places", f"curve-{number}"

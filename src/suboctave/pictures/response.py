@@ -114,7 +114,7 @@ def response_drawing(
     across, upwards = axes.labels(every)
     (x0, x1), (y0, y1) = axes.limits(every, *_MARGINS, from_zero=True)
     ticks = Ticks(8, (3, 4.5, 6, 9)) if axes.view.in_degrees and y1 - y0 > 67.0 else None  # degrees
-    both = Axis(across, x0, x1), Axis(upwards, y0, y1, ticks=ticks)
+    both = Axis(across, x0, x1, shows=axes.shown[0]), Axis(upwards, y0, y1, ticks=ticks, shows=axes.shown[1])
     return Drawing(both, frames, columns=len(groups), by_kind=True)
 
 

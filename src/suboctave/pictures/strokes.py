@@ -7,11 +7,9 @@ an event, not at the computed point nearest to it, so that a dash begins at the 
 
 from __future__ import annotations
 
-import functools
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
@@ -297,7 +295,7 @@ def add_strokes(
     In the plane strokes are smooth, and dashes are not drawn
     upon those of `earlier` curves, in a frame of width and height `spread`.
     """
-    hover, strokes = hover_of(dataset), cut(dataset, line_through(dataset, *axes.of(dataset)))
+    strokes = cut(dataset, line_through(dataset, *axes.of(dataset)))
     if earlier is not None:
         strokes = without_repeats(strokes, earlier.setdefault(pen, []), spread)
     for stroke in strokes:
@@ -306,24 +304,22 @@ def add_strokes(
         drawn: dict[str, Any] = {"smooth": earlier is not None, "role": role, "layer": layer}
         drawn |= {"curve": number_of(dataset), "vertices": np.where(stroke.event >= 0, -1 - stroke.event, stroke.point)}
         own = (pen.dotted if stroke.stable == OPEN else pen.along(stroke.stable)) if floor is None else pen.along(None)
-        texts = partial(hover, stroke.point, stroke.event)
-        frame.items.append(Polyline(at, own, name=name, group=group, hover=texts, **drawn))
+        frame.items.append(Polyline(at, own, name=name, group=group, **drawn))
     return {stroke.stable for stroke in strokes}
 
 
 def events_of(
     dataset: xarray.Dataset, axes: Coordinates, marked: np.ndarray
 ) -> Iterator[tuple[str, KindStyle, dict[str, Any]]]:
-    """The events of a curve by how they are marked: kind, style, and place, role and texts of their `Markers`.
+    """The events of a curve by how they are marked: kind, style, and place and role of their `Markers`.
 
     `marked`, (events,), bool: which of them.
     """
-    places, hover = axes.of(dataset)[1], hover_of(dataset)
+    places = axes.of(dataset)[1]
     for kind, look, every in style.marks(dataset):
         which = every[marked[every]]
         if which.size:
-            words = partial(hover, np.full(which.size, -1), which)
-            placed = {"at": places[:, which], "role": kind, "hover": words}
+            placed = {"at": places[:, which], "role": kind}
             yield kind, look, {**placed, "curve": number_of(dataset), "vertices": -1 - which}
 
 
@@ -354,36 +350,3 @@ def differing(values: Sequence[Mapping[str, float]], digits: int = 6) -> list[li
     """For each curve or motion what tells it from the others: "j = 0" for values that all have and that differ."""
     names = [n for n in values[0] if all(n in own for own in values) and len({own[n] for own in values}) > 1]
     return [[f"{name} = {own[name]:.{digits}g}" for name in names] for own in values]
-
-
-def hover_of(dataset: xarray.Dataset) -> Callable[[np.ndarray, np.ndarray], list[str]]:
-    """What is said of vertices of a curve, by their points and events (see `Line`): omega, free parameters, amplitude,
-    a multiplier.
-
-    Put together when it is first asked for: on paper nothing hovers.
-    """
-
-    @functools.cache
-    def texts(prefix: str, which: str) -> list[str]:
-        plane = str(dataset.attrs.get("plane", "")).split("\n") if dataset.attrs.get("tracked") else []
-        names = ["omega", *(name for name in dict.fromkeys([*plane, str(dataset.attrs["free"])]) if name != "omega")]
-        columns = [coordinate(dataset, name)[bool(prefix)] for name in names]
-        known = dataset.sizes.get("multiplier", 0) > 0
-        leading = dataset["multipliers"].to_numpy()[:, 0] if known else np.full(dataset.sizes["point"], np.nan)
-        multipliers, every = dataset["event_multiplier"].to_numpy() if prefix else leading, []
-        for i, amplitude in enumerate(dataset[f"{prefix}amplitude"].to_numpy()):
-            lines = [f"{spelt(name)} = {own[i]:.{DIGITS}g}" for name, own in zip(names, columns, strict=True)]
-            lines.append(f"amplitude = {amplitude:.7g}")
-            mu = complex(multipliers[i])
-            if np.isfinite(mu):
-                shown = f"{mu.real:.5g}" if abs(mu.imag) < 1e-7 else f"{mu.real:.5g} {mu.imag:+.5g}i"
-                lines.append(f"{which} multiplier = {shown}, modulus {abs(mu):.5g}")
-            every.append("\n".join(lines))
-        return every
-
-    def along(points: np.ndarray, events: np.ndarray) -> list[str]:
-        own = texts("", "leading") if (events < 0).any() else []
-        located = texts("event_", "critical") if (events >= 0).any() else []
-        return [located[e] if e >= 0 else own[p] for p, e in zip(points, events, strict=True)]
-
-    return along

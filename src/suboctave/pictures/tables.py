@@ -16,6 +16,7 @@ from suboctave.pictures.options import dof_names_of
 from suboctave.pictures.strokes import fixed_parameters, number_of, spelt
 from suboctave.pictures.style import period_name, period_of
 from suboctave.store.layout import coordinate, parameter_column
+from suboctave.units import UnitSystem
 
 if TYPE_CHECKING:
     import xarray
@@ -23,22 +24,13 @@ if TYPE_CHECKING:
 
 _TEXT = "text"
 #: attributes of a dataset that have a place of their own on the page, or none
-_PLACED = {
-    "layout",
-    "suboctave",
-    "system",
-    "free",
-    "ended",
-    "closed",
-    "period",
-    "observed_dof",
-    "dofs",
-    "dof_names",
-    "warnings",
-}
-_PLACED |= {"record", "digest", "contents", "tracked", "plane", "isola", "at", "seconds", "number", "early"}
+_PLACED = {"layout", "suboctave", "system", "free", "ended", "closed", "period", "observed_dof", "dofs", "dof_names"}
+_PLACED |= {"warnings", "units", "dofs_left_out", "record", "digest", "contents", "tracked", "plane", "isola", "at"}
+_PLACED |= {"seconds", "number", "early"}
 #: characters of an attribute from which it is folded away, and of a row of a table that stands beside its figure
 _LONG, _BESIDE = 400, 56
+#: rows of a table that are on the page
+_ROWS = 1000
 
 
 @dataclass(frozen=True)
@@ -78,22 +70,33 @@ def summary_of(dataset: xarray.Dataset) -> str:
 def bifurcations(dataset: xarray.Dataset) -> Table:
     """The located events of a curve, in the order met."""
     names = plane_of(dataset) if is_boundary(dataset) else (str(dataset.attrs["free"]),)
-    own, remarks = ("kind", "ω", "max |x|", "multiplier", "residual", "remark"), _remarks(dataset)
+    units, label = UnitSystem.of(str(dataset.attrs.get("units", ""))), observed_label(dataset)
+    heads = "ω", f"max |{label}|"
+    if units is not None:
+        heads = f"ω ({units.frequency})", f"max |{label}| ({units.length})"
+    own, remarks = ("kind", *heads, "multiplier", "residual", "remark"), _remarks(dataset)
     kinds, omega, amplitude, multiplier, residual = (
         dataset[f"event_{name}"].to_numpy() for name in ("kind", "omega", "amplitude", "multiplier", "residual")
     )
     words = [(kind, style.kind_style(kind).name) for kind in map(str, kinds)]
     columns: list[tuple[str, str, Sequence[str]]] = [
         ("kind", _TEXT, [f"{k} ({n})" if k.isupper() and n != k else n for k, n in words]),
-        ("ω", "", _texts(omega)),
+        (heads[0], "", _texts(omega)),
+        *([(units.cycles, "", _texts(omega / (2.0 * math.pi), 7))] if units is not None else ()),
         *((parameter_column(n, own), "", _texts(coordinate(dataset, n)[1])) for n in names if n != "omega"),
-        ("max |x|", "", _texts(amplitude, 7)),
+        (heads[1], "", _texts(amplitude, 7)),
         ("multiplier", "", [_number(complex(mu)) for mu in multiplier]),
         ("residual", "", [_small(value) for value in residual]),
     ]
     number = number_of(dataset)
     places = [f"{number}:{-1 - event}" for event in range(len(kinds))] if number >= 0 else []
     return Table([*columns, ("remark", "long", remarks)] if any(remarks) else columns, places)
+
+
+def observed_label(dataset: xarray.Dataset) -> str:
+    """What the observed displacement of a curve is called."""
+    place, names = int(dataset.attrs.get("observed_dof", 0)), dof_names_of(dataset)
+    return names[place] if place < len(names) else "x" if int(dataset.attrs.get("dofs", 1)) == 1 else f"x_{place}"
 
 
 def _remarks(dataset: xarray.Dataset) -> list[str]:
@@ -122,25 +125,20 @@ def notes_on(dataset: xarray.Dataset) -> list[str]:
                 f"Unsettled: at {open_points} of {near.shape[0]} points {which} is closer to the unit circle than "
                 "its estimated error, so that the verdict there could be the other one."
             )
-    doubtful = int(np.count_nonzero(dataset["event_uncertainty"].to_numpy() > 0.0))
-    if doubtful:
-        what = "bifurcation is" if doubtful == 1 else "bifurcations are"
-        notes.append(f"{doubtful} {what} located to a stated uncertainty: see the remarks in the table.")
     return notes
 
 
 def origin_of(dataset: xarray.Dataset) -> list[tuple[str, str]]:
     """Where the numbers of a curve come from, by name."""
     attrs = dataset.attrs
-    place = int(attrs.get("observed_dof", 0))
-    observed = dict(enumerate(dof_names_of(dataset))).get(place, f"{place}")
     free = plane_of(dataset) if is_boundary(dataset) else (str(attrs["free"]),)
     # omega that does not change although it is free stands at its points
     fixed = [f"{n} = {v:.9g}" for n, v in fixed_parameters(dataset).items() if n not in map(spelt, free)]
     pairs = [
         ("computed by", f"suboctave {attrs.get('suboctave', '(unknown version)')}"),
         ("system", str(attrs.get("system") or "(no name)")),
-        ("degrees of freedom", f"{attrs.get('dofs', 1)}, observed: {observed}"),
+        *([("units", str(attrs["units"]))] if attrs.get("units") else []),
+        ("degrees of freedom", f"{attrs.get('dofs', 1)}, observed: {observed_label(dataset)}"),
         ("free parameter", " and ".join(map(spelt, free))),
         ("fixed parameters", ", ".join(fixed) or "none"),
     ]
@@ -176,7 +174,9 @@ def isolas_table(head: xarray.Dataset, closed: Mapping[str, xarray.Dataset] | No
     """One row for each isola, which leads to the first of its closed branches; None where there are none."""
     if not head.sizes["isola"]:
         return None
-    headings = (f"{parameter_of(head)} from", "to", "born at", "ω", "merges at", "ω")
+    units = next((UnitSystem.of(str(data.attrs.get("units", ""))) for data in (closed or {}).values()), None)
+    omega = "ω" if units is None else f"ω ({units.frequency})"
+    headings = (f"{parameter_of(head)} from", "to", "born at", omega, "merges at", omega)
     keys = ("from", "to", "born", "born_omega", "merges", "merges_omega")
     places = [""] * head.sizes["isola"]
     for dataset in reversed([*(closed or {}).values()]):
@@ -205,10 +205,13 @@ def notes_on_isolas(head: xarray.Dataset) -> tuple[list[str], list[str]]:
     return sentences, notes + str(head.attrs.get("notes", "")).splitlines()
 
 
-def columns_of(dataset: xarray.Dataset) -> Table:
-    """A result that is no curve: its columns as they are."""
+def columns_of(dataset: xarray.Dataset) -> tuple[Table, list[str]]:
+    """A result that is no curve: its columns as they are, the first rows of many; and what is not shown, in words."""
     columns = {str(name): data.to_numpy() for name, data in dataset.data_vars.items() if data.dims == ("row",)}
-    return Table([(n, _TEXT if c.dtype.kind in "OU" else "", [_cell(v) for v in c]) for n, c in columns.items()])
+    count = dataset.sizes["row"]
+    note = [f"The first {_ROWS} of {count} rows; results files and CSV have all."] if count > _ROWS else []
+    shown = {name: column[:_ROWS] for name, column in columns.items()}
+    return Table([(n, _TEXT if c.dtype.kind in "OU" else "", [_cell(v) for v in c]) for n, c in shown.items()]), note
 
 
 def _texts(values: np.ndarray, digits: int = 9) -> list[str]:

@@ -374,8 +374,11 @@ class Branch(CurveTables, BranchReadings):
         (`suboctave.store.motions.with_motions`).
         """
         from suboctave.store.layout import branch_dataset, events_met
-        from suboctave.store.motions import with_motions
+        from suboctave.store.motions import elements_of, with_motions
 
+        if motions:
+            own = (self.available_readings() if readings else []) if isinstance(readings, bool) else readings
+            readings = [*own, *(f"peak_force_{index}" for index in elements_of(self.system))]
         dataset = with_readings(branch_dataset(self), self, events_met(self), readings)
         return with_motions(dataset, self) if motions else dataset
 

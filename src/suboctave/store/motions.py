@@ -25,6 +25,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -32,6 +33,7 @@ import numpy as np
 from suboctave.bifurcation.gaps import contact_side
 from suboctave.errors import GivenDof, InputError, chosen_dof, dof_text
 from suboctave.harmonic.basis import Array, to_real
+from suboctave.harmonic.energy import fed
 from suboctave.harmonic.orbit import PeriodicOrbit, force_along
 from suboctave.model.elements.coupled import reads
 from suboctave.model.elements.smoothness import levels
@@ -205,36 +207,102 @@ def motion_dataset(
 
 
 # ----------------------------------------------------------------------------------------------- all motions of a curve
-#: gaps whose contacts are laid out; those of further elements are left out
-_GAPS = 12
+#: gaps whose contacts are laid out, and elements whose forces are; those of further ones are left out
+_GAPS, _ELEMENTS = 12, 8
+#: degrees of freedom up to which all are laid out; of larger systems as many of those observed, loaded and read
+_DOFS = 24
+#: instants in a load period, and in all of a motion, at which the forces of elements are laid out
+_INSTANTS, _MOST_INSTANTS = 192, 768
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A displacement that is laid out of all motions, `direction . x`; `dof`: the number of the DOF that it is, else
+    -1.
+    """
+
+    label: str
+    direction: Array
+    dof: int
+
+
+def signals_of(system: Any, observe: int) -> list[Signal]:
+    """The displacements that are laid out: the observed DOF, the others, and what elements between DOFs read.
+
+    Of a system of many DOFs those that loads act on and elements read, the first ones.
+    """
+    n, names = system.n, system.dof_names
+    read = [np.asarray(row, dtype=float) for element in system.elements for row in element.inputs(n)]
+    dofs = range(n)
+    if n > _DOFS:
+        loaded = [component.direction for component in system.load_components()]
+        touched = [int(dof) for row in (*loaded, *read) for dof in np.flatnonzero(row)[:_DOFS]]
+        dofs = list(dict.fromkeys([observe, *touched]))[:_DOFS]
+    order = [observe, *(dof for dof in dofs if dof != observe)]
+    signals = [Signal(_dof_label(dof, n, names), _unit(n, dof), dof) for dof in order]
+    for row in read:
+        ends = np.flatnonzero(row)
+        one = len(ends) == 1 and row[ends[0]] == 1.0 and ends[0] in order
+        if not one and len(signals) < 2 * _DOFS and not any(np.array_equal(row, own.direction) for own in signals):
+            signals.append(Signal(_direction_label(row, n, names), row, -1))
+    return signals
+
+
+def _dof_label(dof: int, n: int, names: Sequence[str]) -> str:
+    return names[dof] if names else "x" if n == 1 else f"x_{dof}"
+
+
+def _direction_label(direction: Array, n: int, names: Sequence[str]) -> str:
+    """A combination of displacements in words: "tip - root"."""
+    terms = []
+    for dof in sorted(np.flatnonzero(direction).tolist(), key=lambda dof: -direction[dof])[:3]:
+        size = abs(direction[dof])
+        sign = ("- " if terms else "-") if direction[dof] < 0.0 else "+ " * bool(terms)
+        terms.append(f"{sign}{'' if size == 1.0 else f'{size:.3g} '}{_dof_label(dof, n, names)}")
+    more = ["+ ..."] if np.count_nonzero(direction) > len(terms) else []
+    return " ".join([*terms, *more])
+
+
+def elements_of(system: Any) -> range:
+    """The elements whose forces are laid out: the first ones."""
+    return range(min(_ELEMENTS, len(system.elements)))
 
 
 def with_motions(dataset: xarray.Dataset, branch: Any) -> xarray.Dataset:
     """The dataset of a branch with the motions at its points and, with the prefix `event_`, at its events.
 
     Variables: `motion` (point x signal x motion_coefficient), a_0, a_1, b_1, ... of `signal` 0, the observed degree of
-    freedom, and of the displacements that elements with gaps read; `gap_level` (point x gap), where contact begins,
-    `gap_signal`, `gap_side` (+1: in contact above it) and `gap_label` (gap,); `event_harmonics`, `event_error`,
-    `event_multipliers` of events.
+    freedom, of the others, and of the displacements that elements between them read; `signal_label`, `signal_dof`
+    (signal,), the number of the degree of freedom or -1; `gap_level` (point x gap), where contact begins, `gap_signal`,
+    `gap_side` (+1: in contact above it) and `gap_label` (gap,); `force` (point x element x instant), of elements over
+    one period of the motion, `element_index`, `element_label`, their largest values being readings; `event_harmonics`,
+    `event_error`, `event_multipliers` of events. Attribute `dofs_left_out`: how many degrees of freedom are not among
+    the signals.
     """
     if not len(branch):
         return dataset
     events = [event for event in events_met(branch) if event.orbit is not None]
     orbits, met = list(branch.orbits), [event.orbit for event in events]
     first, n = orbits[0], branch.system.n
-    signals = [_unit(n, branch.observe)]
+    signals = signals_of(branch.system, branch.observe)
     gaps: list[tuple[int, int, int, int, str]] = []
     for index, element in enumerate(first.balance.system.elements):
         places = _levels(first, index)
         if not places or len(gaps) + len(places) > _GAPS:
             continue
         direction = np.asarray(reads(element, n), dtype=float)
-        same = [i for i, signal in enumerate(signals) if np.array_equal(signal, direction)]
+        same = [i for i, signal in enumerate(signals) if np.array_equal(signal.direction, direction)]
         if not same:
-            signals.append(direction)
+            signals.append(Signal(_direction_label(direction, n, branch.system.dof_names), direction, -1))
         which, local = same[0] if same else len(signals) - 1, first.state().local(index)
         gaps += [(index, place, which, contact_side(local, place), element.label) for place in range(len(places))]
+    elements = list(elements_of(branch.system))
+    labels = [branch.system.elements[index].label for index in elements]
     added: dict[str, Any] = {
+        "signal_label": ("signal", np.array([signal.label for signal in signals], dtype=object)),
+        "signal_dof": ("signal", np.array([signal.dof for signal in signals], dtype=int)),
+        "element_index": ("element", np.array(elements, dtype=int)),
+        "element_label": ("element", np.array(labels, dtype=object)),
         "gap_signal": ("gap", np.array([gap[2] for gap in gaps], dtype=int)),
         "gap_side": ("gap", np.array([gap[3] for gap in gaps], dtype=int)),
         "gap_label": ("gap", np.array([gap[4] for gap in gaps], dtype=object)),
@@ -245,18 +313,28 @@ def with_motions(dataset: xarray.Dataset, branch: Any) -> xarray.Dataset:
             padded([event.multipliers for event in events], complex),
         ),
     }
+    count = min(_MOST_INSTANTS, first.basis.nu * _INSTANTS)
+    tau = 2.0 * math.pi * np.arange(count) / count
+    directions, seen = np.array([signal.direction for signal in signals]), dict[int, Array]()
     for prefix, axis, own in (("", "point", orbits), ("event_", "event", met)):
         size = max((orbit.basis.size for orbit in own), default=1)
         table = np.zeros((len(own), len(signals), size))
         levels_there = np.full((len(own), len(gaps)), np.nan)
+        force = np.zeros((len(own), len(elements), count))
         for row, orbit in enumerate(own):
-            for i, direction in enumerate(signals):
-                table[row, i, : orbit.basis.size] = to_real(orbit.along(direction))
+            part, state = orbit.balance.linear, fed(orbit.state(), orbit.zeta)
+            if id(part) not in seen:  # one for all motions of most curves
+                seen[id(part)] = part.seen(directions)
+            table[row, :, : orbit.basis.size] = to_real(state.recovered @ seen[id(part)].T).T
             known = {index: _levels(orbit, index) for index in {gap[0] for gap in gaps}}
             levels_there[row] = [known[gap[0]][gap[1]] for gap in gaps]
+            for i, index in enumerate(elements):
+                force[row, i] = force_along(state, index)(tau)
         added[f"{prefix}motion"] = ((axis, "signal", f"{prefix}motion_coefficient"), table)
         added[f"{prefix}gap_level"] = ((axis, "gap"), levels_there)
-    return dataset.assign(added)
+        added[f"{prefix}force"] = ((axis, "element", "instant"), force)
+    left = n - sum(signal.dof >= 0 for signal in signals)
+    return dataset.assign(added).assign_attrs(dofs_left_out=left)
 
 
 def _unit(n: int, dof: int) -> Array:

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from suboctave.errors import SuboctaveError
-from suboctave.pictures.report import page_of, picture_of, template
+from suboctave.pictures.report import page_of, template
+from suboctave.pictures.sections import picture_of
 from suboctave.store.journal import read_journal
 from suboctave.store.layout import EventRow, curve_dataset
 from suboctave.study.outputs import shown_on_page

@@ -10,12 +10,13 @@ function numbers(text, Kind) {
 function unpackPlaces(packed, signals) {
   const places = { ...packed, values: {} };
   for (const name of Object.keys(packed.values)) { places.values[name] = numbers(packed.values[name], Float64Array); }
-  for (const name of ["amplitude", "residual", "error", "levels"]) {
+  for (const name of ["amplitude", "residual", "error", "levels", "peaks", "force_sizes"]) {
     if (packed[name] !== undefined) { places[name] = numbers(packed[name], Float64Array); }
   }
   if (packed.stable) { places.stable = numbers(packed.stable, Uint8Array); }
   if (packed.harmonics) { places.harmonics = numbers(packed.harmonics, Int32Array); }
   if (packed.multipliers) { places.multipliers = numbers(packed.multipliers, Float32Array); }
+  if (packed.force) { places.force = numbers(packed.force, Int16Array); }
   if (packed.motion) {
     places.motion = numbers(packed.motion, Float32Array);
     places.begins = [0];
@@ -28,8 +29,8 @@ function unpackPlaces(packed, signals) {
 function curveOf(number) {
   const curve = curves[number];
   if (curve && !curve.unpacked) {
-    curve.points = unpackPlaces(curve.points, curve.gaps.signals);
-    curve.events = { ...curve.events, ...unpackPlaces(curve.events, curve.gaps.signals) };
+    curve.points = unpackPlaces(curve.points, curve.signals.length);
+    curve.events = { ...curve.events, ...unpackPlaces(curve.events, curve.signals.length) };
     curve.unpacked = true;
   }
   return curve;
@@ -60,6 +61,14 @@ function coefficients(place, signal) {
   return place.places.motion.subarray(begin, begin + size);
 }
 
+// The force of an element over one period of the motion at a place, at equal intervals; null where the page has none.
+function forceAt(curve, place, element) {
+  const { force, force_sizes } = place.places, { count } = curve.instants;
+  if (!force) { return null; }
+  const at = place.at * curve.elements.length + element;
+  return Array.from(force.subarray(at * count, (at + 1) * count), (value) => (value / 32767) * force_sizes[at]);
+}
+
 // The motion, or its first or second derivative by t, at the phase tau = omega t / nu.
 function motionAt(c, tau, order, rate) {
   let sum = order === 0 ? c[0] : 0;
@@ -78,24 +87,6 @@ function samples(c, nu, omega) {
   const tau = Array.from({ length: count + 1 }, (_, i) => (2 * Math.PI * i) / count);
   return { tau, count, rate, t: tau.map((one) => one / rate),
     x: tau.map((one) => motionAt(c, one, 0, rate)), v: tau.map((one) => motionAt(c, one, 1, rate)) };
-}
-
-// max |x|, by Newton's method on dx/dt = 0 from the largest samples.
-function peak(c, sampled) {
-  const { tau, x, rate } = sampled;
-  let best = 0;
-  x.forEach((value, i) => {
-    if (Math.abs(value) < Math.abs(x[(i + 1) % x.length]) || Math.abs(value) < Math.abs(x.at(i - 1))) { return; }
-    let at = tau[i];
-    for (let step = 0; step < 6; step++) {
-      const slope = motionAt(c, at, 1, rate), bend = motionAt(c, at, 2, rate);
-      if (!bend) { break; }
-      const move = Math.max(-0.01, Math.min(0.01, (slope / bend) * rate));
-      at -= move;
-    }
-    best = Math.max(best, Math.abs(value), Math.abs(motionAt(c, at, 0, rate)));
-  });
-  return best;
 }
 
 // Share of the period in contact and contacts begun in it, of each gap; instants at which x crosses it are bisected.
@@ -119,7 +110,7 @@ function contacts(curve, place) {
       share += first ? low - tau[i] : tau[i + 1] - low;
       begun += last ? 1 : 0;
     }
-    found.push({ name, level, own: signal[gap] === 0, share: share / (2 * Math.PI), begun });
+    found.push({ name, level, signal: signal[gap], share: share / (2 * Math.PI), begun });
   });
   return found;
 }
@@ -187,10 +178,15 @@ function csv(rows) {
   return rows.map((row) => row.map(cell).join(",")).join("\n") + "\n";
 }
 
+function csvName() {
+  const force = forceOf(view.quantity), k = quantities[view.quantity]?.numbered ? ` ${view.harmonic}` : "";
+  return force !== null ? `largest force of ${force}` : `${view.quantity}${k} of ${view.signal || "the observed displacement"}`;
+}
+
 function csvOfCurves(wanted) {
   const known = wanted.flatMap((n) => [...Object.keys(curveOf(n).points.values), ...Object.keys(curves[n].fixed)]);
-  const names = [...new Set(known)];
-  const rows = [["curve", "point", "event", ...names, "amplitude", "stable", "multiplier_real", "multiplier_imag",
+  const names = [...new Set(known)], also = usual() ? [] : [csvName()];
+  const rows = [["curve", "point", "event", ...names, "amplitude", ...also, "stable", "multiplier_real", "multiplier_imag",
     "residual", "error"]];
   for (const number of wanted) {
     const curve = curveOf(number);
@@ -198,7 +194,8 @@ function csvOfCurves(wanted) {
     for (const vertex of along) {
       const place = placeOf(curve, vertex), [re, im] = place.multipliers[0] || [NaN, NaN];
       rows.push([curve.name, vertex < 0 ? "" : vertex, vertex < 0 ? curve.events.kind[-1 - vertex] : "",
-        ...names.map((name) => place.values[name]), place.amplitude, place.stable === null ? "" : place.stable,
+        ...names.map((name) => place.values[name]), place.amplitude,
+        ...also.map(() => shownAt(curve, vertex, "quantity")), place.stable === null ? "" : place.stable,
         re, im, place.residual, place.error]);
     }
   }

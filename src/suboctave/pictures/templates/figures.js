@@ -18,7 +18,7 @@ const chosenMark = { name: "chosen point", showlegend: false, hoverinfo: "skip",
 function chosenTrace(figure, choice) {
   const at = { x: [], y: [], z: [] };
   if (choice) {
-    for (const trace of figure.drawing.data) {
+    for (const trace of figure.traces) {
       if (!trace.meta || trace.meta.curve !== choice.curve || !trace.customdata || trace.meta.role === "floor") { continue; }
       const i = trace.customdata.indexOf(choice.vertex);
       if (i >= 0) { for (const letter of "xyz") { if (trace[letter]) { at[letter] = [trace[letter][i]]; } } break; }
@@ -34,8 +34,8 @@ function chosenTrace(figure, choice) {
 
 // Colours of cells stay, and so do those of what is drawn upon them.
 function tracesOf(figure) {
-  const { data } = figure.drawing, cells = data.some((trace) => trace.type === "heatmap");
-  return [...(cells ? data : data.map(traceOn)), chosenTrace(figure, chosen)];
+  const cells = figure.traces.some((trace) => trace.type === "heatmap");
+  return [...(cells ? figure.traces : figure.traces.map(traceOn)), chosenTrace(figure, chosen)];
 }
 
 // A legend of many entries stands below the frame and must not eat it up.
@@ -52,14 +52,47 @@ function drawFigure(figure) {
     modeBarButtons: drawing.space
       ? [["orbitRotation", "tableRotation", "zoom3d", "pan3d"], ["resetCameraDefault3d"]]
       : [["zoom2d", "pan2d"], ["zoomIn2d", "zoomOut2d", "resetScale2d"]] };
-  const layout = layoutOn(drawing.layout);
-  if (figure.done) { keepView(layout, plot.layout); }
+  figure.traces = drawing.data.map((trace) => viewed(trace, figure));
+  const inView = layoutInView(figure, figure.traces), layout = layoutOn(inView), seen = JSON.stringify(view);
+  if (figure.done && figure.seen === seen) { keepView(layout, plot.layout); }
+  figure.seen = seen;
+  figure.layout = inView;
   Plotly.react(plot, tracesOf(figure), layout, config);
   if (!figure.done) {
     figure.done = true;
     performance.mark("figure drawn");
-    plot.on("plotly_click", (event) => clicked(event.points[0]));
+    plot.on("plotly_click", (event) => { figure.hit = performance.now(); clicked(event.points[0], figure); });
   }
+}
+
+// A click on a place where nothing is drawn: in a plane of parameters what is near it, else a word that nothing is.
+function watchClicks(figure) {
+  let down = null;
+  figure.plot.addEventListener("pointerdown", (event) => { down = { x: event.clientX, y: event.clientY, hit: figure.hit }; }, true);
+  document.addEventListener("pointerup", (event) => {
+    const from = down;
+    down = null;
+    if (!from || !figure.done || figure.drawing.space || Math.hypot(event.clientX - from.x, event.clientY - from.y) > 5) { return; }
+    setTimeout(() => { if (figure.hit === from.hit) { clickedBeside(figure, from); } }, 350);
+  }, true);
+}
+
+function clickedBeside(figure, { x, y }) {
+  const { xaxis, yaxis } = figure.plot._fullLayout, box = figure.plot.getBoundingClientRect();
+  const [across, upwards] = [x - box.x - xaxis._offset, y - box.y - yaxis._offset], [first, second] = figure.drawing.axes;
+  if (across < 0 || across > xaxis._length || upwards < 0 || upwards > yaxis._length) { return; }
+  const ofPlane = first && second && first !== "quantity" && second !== "quantity";
+  if (!ofPlane) { say(figure, "Nothing is drawn there: click on a line or a marker."); return; }
+  const real = (axis, pixels) => (axis.type === "log" ? 10 ** axis.p2l(pixels) : axis.p2l(pixels));
+  const value = (name, shownValue) => (name === "omega" && view.cycles ? 2 * Math.PI * shownValue : shownValue);
+  choosePlace({ [first]: value(first, real(xaxis, across)), [second]: value(second, real(yaxis, upwards)) }, "");
+}
+
+// A word below a figure, gone after a while.
+function say(figure, words) {
+  figure.words.textContent = words;
+  clearTimeout(figure.saying);
+  figure.saying = setTimeout(() => { figure.words.textContent = ""; }, 6000);
 }
 
 // What the reader zoomed into, or turned, stays.
@@ -70,14 +103,21 @@ function keepView(layout, before) {
   if (layout.scene && before.scene) { layout.scene = { ...layout.scene, camera: before.scene.camera }; }
 }
 
-function clicked(point) {
+function clicked(point, figure) {
   const { meta } = point.data;
   if (meta && meta.cells) {
-    choosePlace(point.x, point.y, meta.cells[point.z], point.xaxis.title.text, point.yaxis.title.text);
+    const [first, second] = figure.drawing.axes, titles = [point.xaxis.title.text, point.yaxis.title.text];
+    const names = [first || plainText(titles[0]), second || plainText(titles[1])];
+    const at = names[0] === "omega" && view.cycles ? 2 * Math.PI * point.x : point.x;
+    choosePlace({ [names[0]]: at, [names[1]]: point.y }, meta.cells[point.z]);
   } else if (meta && point.customdata !== undefined && point.customdata !== null) {
-    choose(meta.curve, point.customdata);
+    choose(meta.curve, point.customdata, figure);
+  } else {
+    say(figure, "No motion belongs to this place: click on a line or a marker.");
   }
 }
+
+function plainText(html) { return html.replace(/<[^>]*>/g, ""); }
 
 function markFigures() {
   for (const figure of figures) {
@@ -94,9 +134,9 @@ function actionsOf(figure) {
   row.className = "actions";
   row.append("Save as");
   const picture = (format) => {
-    const layout = { ...figure.drawing.layout };
-    if (figure.done) { keepView(layout, figure.plot.layout); }
-    Plotly.downloadImage({ data: figure.drawing.data, layout }, { format, filename: name, width: 960, height: 600, scale: format === "png" ? 2 : 1 });
+    const layout = { ...figure.layout };
+    keepView(layout, figure.plot.layout);
+    Plotly.downloadImage({ data: figure.traces, layout }, { format, filename: name, width: 960, height: 600, scale: format === "png" ? 2 : 1 });
   };
   const data = () => {
     const own = [...new Set(figure.drawing.data.filter((t) => t.meta && t.meta.curve !== undefined).map((t) => t.meta.curve))];
@@ -110,6 +150,8 @@ function actionsOf(figure) {
     button.addEventListener("click", act);
     row.append(button);
   }
+  figure.words = element("span", "", { class: "words", role: "status" });
+  row.append(figure.words);
   return row;
 }
 
@@ -125,6 +167,22 @@ function csvOfTraces(data) {
   return csv(rows);
 }
 
+// Where the chosen point is on the screen in a figure; null where it is not drawn.
+function onScreen(figure) {
+  const { x, y } = chosenTrace(figure, chosen), { xaxis, yaxis } = figure.plot._fullLayout;
+  if (figure.drawing.space || !x.length || x[0] === null) { return null; }
+  const box = figure.plot.getBoundingClientRect();
+  return { x: box.x + xaxis._offset + xaxis.d2p(x[0]), y: box.y + yaxis._offset + yaxis.d2p(y[0]) };
+}
+
+// On a small screen the panel covers the lower part: the chosen point is brought above it.
+function keepInSight(figure) {
+  const wide = window.matchMedia("(min-width: 70rem)").matches, at = !wide && figure && figure.done ? onScreen(figure) : null;
+  if (!at) { return; }
+  const top = panel.getBoundingClientRect().top;
+  if (at.y > top - 40 || at.y < 40) { window.scrollBy({ top: at.y - 0.6 * top, behavior: "instant" }); }
+}
+
 function startFigures() {
   document.querySelectorAll(".figure").forEach((element) => {
     const script = element.querySelector("script");
@@ -135,6 +193,7 @@ function startFigures() {
     element.appendChild(actionsOf(figure));
     figure.plot.tabIndex = 0;
     figure.plot.addEventListener("keydown", (event) => keyed(event, figure));
+    watchClicks(figure);
     figures.push(figure);
   });
   document.body.classList.add("live");

@@ -1,6 +1,6 @@
 function redraw() {
   figures.filter((figure) => figure.done).forEach(drawFigure);
-  if (chosen) { choose(chosen.curve, chosen.vertex); }
+  if (chosen) { choose(chosen.curve, chosen.vertex, null); }
 }
 
 async function start() {
@@ -9,6 +9,7 @@ async function start() {
   if (known) { curves.push(...JSON.parse(known.textContent)); }
   try {
     if (!await unpackPlotly()) { return; }
+    startView();
     startFigures();
     startTables();
     document.addEventListener("keydown", (event) => { if (event.key === "Escape" && !panel.hidden) { close(); } });
