@@ -45,6 +45,17 @@ class CurveProgress:
         self.report(share, ", ".join([where, *counted]) if points else where)
 
 
+class PartOf:
+    """Reports of one of `count` parts of a task as reports of the whole; who follows curves follows the part's."""
+
+    def __init__(self, report: Report, number: int, count: int, title: str) -> None:
+        self.report, self.number, self.count, self.title = report, number, count, title
+        self.followed: Callable[[Any], None] | None = getattr(report, "followed", None)
+
+    def __call__(self, share: float, where: str) -> None:
+        self.report((self.number + share) / self.count, f"{self.title}, {where}")
+
+
 @contextmanager
 def reporting(progress: Any, title: str) -> Iterator[Report | None]:
     """A function (share done, where) to report to, or None.

@@ -183,7 +183,7 @@ def test_the_report(tmp_path):
     words = re.sub(r"<[^>]+>", " ", page.split("<script", 1)[0])
     for said in ("1 isola", "left open", "Isola 0: odd", "Isola 0, j = 0.5: shrinks", "&lt;cut&gt;"):
         assert said in words, said
-    assert page.count('<div class="figure">') == 3 + 3
+    assert page.count('<div class="figure">') == 3  # the plane, the closed branches, both in space
     alone = write_report({"none": Isolas({})}, tmp_path / "none.html").read_text(encoding="utf-8")
     assert "1 isola" in alone
     assert "plotly-packed" not in alone.split("<script>")[0]

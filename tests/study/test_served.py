@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import http.client
+import re
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -60,7 +61,8 @@ def test_a_browser_is_opened_where_there_is_a_screen(monkeypatch):
     assert opened == ["http://127.0.0.1:1/"]
 
 
-def test_the_page_of_a_run_shows_what_was_found_so_far(study_file):
+def test_the_page_of_a_run_shows_what_was_found_so_far(study_file, monkeypatch):
+    monkeypatch.setattr("suboctave.study.runner._OFTEN", 0.0)  # every point is written down
     text = Path(study_file()).read_text(encoding="utf-8").replace('title = "Duffing"', f'title = "{EVIL}"')
     study = read_study(study_file(text, "evil.toml"))
     watching, seen = Watching(study, study.folder), []
@@ -70,7 +72,11 @@ def test_the_page_of_a_run_shows_what_was_found_so_far(study_file):
         """Looks at the page while an analysis runs."""
 
         def __enter__(self):
-            return lambda share, where: seen.append(watching.page()) if not seen and share > 0.5 else None
+            return watching.reporting(self)
+
+        def __call__(self, share, where):
+            if len(seen) < 2 and share > (0.3, 0.7)[len(seen)]:
+                seen.append(watching.page())
 
         def __exit__(self, *_):
             seen.append(watching.page())
@@ -80,9 +86,14 @@ def test_the_page_of_a_run_shows_what_was_found_so_far(study_file):
         return Progress()
 
     outcome = run_study(study, watch=watch, report=watching.note)
-    running, over, *_ = seen
+    running, later, over, *_ = seen
     assert f'content="{REFRESH}"' in running
-    assert ">running<" in running
+    # the curve grows while its analysis runs, and the share that is done is shown
+    shares = [float(re.search(r'<progress value="([\d.]+)"', page)[1]) for page in (running, later)]
+    assert 0.3 < shares[0] < 0.7 < shares[1] <= 1.0
+    points = [int(re.search(r"points, .*?</td><td>(\d+)</td>", page)[1]) for page in (running, later)]
+    assert 2 <= points[0] < points[1] < len(outcome.results["response"])
+    assert len({re.search(r"data:image/svg\+xml;base64,(\S+)", page)[1] for page in (running, later)}) == 2
     assert "data:image/svg+xml" in over  # what is finished is drawn
     assert ">LP<" in over  # and what was located is listed
     for page in seen:

@@ -26,7 +26,7 @@ from suboctave.interruption import Interruption
 from suboctave.model.inputs import check_count, timed
 from suboctave.model.system import System
 from suboctave.options import with_options
-from suboctave.progress import Report, reporting
+from suboctave.progress import PartOf, Report, reporting
 from suboctave.results.branch import Branch
 from suboctave.results.diagram import BifurcationDiagram, DiagramBranch
 from suboctave.store.layout import events_met
@@ -152,7 +152,7 @@ class _Growth:
         report = self.report
         if report is None:
             return self.options
-        return {**self.options, "progress": lambda share, where: report((number + share) / count, f"{title}, {where}")}
+        return {**self.options, "progress": PartOf(report, number, count, title)}
 
     def _kept(self, parent: int, event: int, follow: Callable[[], Branch]) -> Branch:
         """A branch from the keeper if that knows it, else followed now."""

@@ -90,8 +90,8 @@ def figure_data(drawing: Drawing, name: str) -> dict[str, Any]:
         drawn = _trace(items, drawing.axes, frame)
         if drawn:
             data.append(drawn | entry | _vertices(items))
-    if together:
-        data += [_sample(name, own) for name, own in frame.entries.items() if own.mark is not None or name in _STYLES]
+    common = {n: own for n, own in frame.entries.items() if n not in shown and (own.mark is not None or n in _STYLES)}
+    data += [_sample(name, own) for name, own in common.items()] if together else []
     if any(isinstance(item, Raster) for item in frame.items):
         data += [_patch(name, own) for name, own in frame.entries.items() if own.colour]
     if frame.labels and not in_space:

@@ -69,7 +69,7 @@ _FEW = 4.0
 _SMALL = 4.2
 
 
-def figure_of(drawing: Drawing, sheet: style.Sheet) -> Figure:
+def figure_of(drawing: Drawing | Callable[[Figure], None], sheet: style.Sheet) -> Figure:
     """The figure of a drawing on a page, without a window."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -92,6 +92,15 @@ def finished(drawing: Drawing, sheet: style.Sheet, path: str | Path | None, opti
         if path is not None:
             save_figure(figure, path)
         return figure
+    return save_or_show(drawing, sheet, path)
+
+
+def save_or_show(
+    drawing: Drawing | Callable[[Figure], None], sheet: style.Sheet, path: str | Path | None
+) -> Figure:
+    """The figure of a drawing, or of what fills one, saved where a path is given; else at a prompt in a window, where
+    there is a screen.
+    """
     if path is None and at_prompt():
         from matplotlib import get_backend, pyplot
         from matplotlib.backends import BackendFilter, backend_registry
@@ -108,7 +117,10 @@ def finished(drawing: Drawing, sheet: style.Sheet, path: str | Path | None, opti
     return figure
 
 
-def _filled(figure: Figure, drawing: Drawing, sheet: style.Sheet) -> Figure:
+def _filled(figure: Figure, drawing: Drawing | Callable[[Figure], None], sheet: style.Sheet) -> Figure:
+    if not isinstance(drawing, Drawing):
+        drawing(figure)
+        return figure
     if len(drawing.axes) == 3:
         _in_space(figure, drawing, sheet)
     else:

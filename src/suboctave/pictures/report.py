@@ -179,7 +179,9 @@ def _datasets(name: str, item: Any) -> dict[str, xarray.Dataset]:
     import xarray
 
     given: Any = item
-    if hasattr(item, "to_table"):
+    if hasattr(item, "points_table"):  # a sweep
+        given = item.points_table().to_xarray().assign_attrs(warnings="\n".join(item.failure_lines()))
+    elif hasattr(item, "to_table"):
         given = item.to_table().to_xarray()
     elif any(hasattr(item, name) for name in ("bifurcations_frame", "limit_points")):  # curves: with their motions
         given = item.to_xarray(motions=True)

@@ -182,8 +182,10 @@ def _alone(name: str, contents: Contents, item: Any, drawn: set[int]) -> Section
     (dataset,) = curves.values()
     heading = str(dataset.attrs.get("title", ""))
     figures = [contents.pictures[name]] if name in contents.pictures else []
-    table, notes = columns_of(dataset) if "row" in dataset.sizes else (None, [])
-    return Section(name, [name], before=[heading] if heading else [], table=table, after=notes, figures=figures)
+    table, after = columns_of(dataset) if "row" in dataset.sizes else (None, [])
+    notes = str(dataset.attrs.get("warnings", "")).splitlines()
+    texts: dict[str, Any] = {"before": [heading] if heading else [], "after": after, "notes": notes}
+    return Section(name, [name], table=table, figures=figures, **texts)
 
 
 def _isolas(

@@ -377,8 +377,10 @@ class Branch(CurveTables, BranchReadings):
         from suboctave.store.motions import elements_of, with_motions
 
         if motions:
-            own = (self.available_readings() if readings else []) if isinstance(readings, bool) else readings
-            readings = [*own, *(f"peak_force_{index}" for index in elements_of(self.system))]
+            own = (
+                self.available_readings() if readings is True else [readings] if isinstance(readings, str) else readings
+            )
+            readings = [*(own or ()), *(f"peak_force_{index}" for index in elements_of(self.system))]
         dataset = with_readings(branch_dataset(self), self, events_met(self), readings)
         return with_motions(dataset, self) if motions else dataset
 

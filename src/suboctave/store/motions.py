@@ -233,7 +233,7 @@ def signals_of(system: Any, observe: int) -> list[Signal]:
     """
     n, names = system.n, system.dof_names
     read = [np.asarray(row, dtype=float) for element in system.elements for row in element.inputs(n)]
-    dofs = range(n)
+    dofs: Iterable[int] = range(n)
     if n > _DOFS:
         loaded = [component.direction for component in system.load_components()]
         touched = [int(dof) for row in (*loaded, *read) for dof in np.flatnonzero(row)[:_DOFS]]
@@ -254,7 +254,7 @@ def _dof_label(dof: int, n: int, names: Sequence[str]) -> str:
 
 def _direction_label(direction: Array, n: int, names: Sequence[str]) -> str:
     """A combination of displacements in words: "tip - root"."""
-    terms = []
+    terms: list[str] = []
     for dof in sorted(np.flatnonzero(direction).tolist(), key=lambda dof: -direction[dof])[:3]:
         size = abs(direction[dof])
         sign = ("- " if terms else "-") if direction[dof] < 0.0 else "+ " * bool(terms)

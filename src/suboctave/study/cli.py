@@ -10,6 +10,8 @@ import json
 import shlex
 import sys
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -168,6 +170,19 @@ def _wait(address: str) -> None:
     wait_for_ctrl_c()
 
 
+@contextmanager
+def _reporting(name: str, watching: Any) -> Iterator[Any]:
+    """Whom an analysis reports to: a bar, and the page of who is `watching`."""
+    from suboctave.progress import bar
+
+    with bar(name) as shown:
+        if watching is None:
+            yield shown
+            return
+        watching.begin(name)
+        yield watching.reporting(shown)
+
+
 def _run(
     study: Path,
     read: Any,
@@ -179,7 +194,6 @@ def _run(
     json_wanted: bool,
 ) -> None:
     """Run a study that was read, with what it finds on the terminal, and on a page for who is `watching`."""
-    from suboctave.progress import bar
     from suboctave.study.runner import Finished, run_study
     from suboctave.study.screen import console
     from suboctave.study.shown import as_plain, print_result
@@ -199,9 +213,7 @@ def _run(
 
     def watch(step: Any) -> Any:
         head()
-        if watching is not None:
-            watching.begin(step.name)
-        return bar(step.name)
+        return _reporting(step.name, watching)
 
     def report(item: Finished) -> None:
         head()
@@ -300,18 +312,19 @@ def sweep_command(
     asked = parameters_of(grid or (), random or (), points)
     folder = out if out is not None else read.folder
     make_folder(folder)
-    table = folder / "sweep.csv" if read.outputs.csv else None
-    if table is not None and not (overwrite or resume):
-        free_place(table)
+    others = [folder / f"sweep{suffix}" for suffix in (".csv", ".png", ".html")]
+    for place in others if not (overwrite or resume) else ():
+        free_place(place)
     options = {
         "draws": draws, "seed": seed, "sampling": sampling, "path": folder / "sweep.nc", "workers": workers,
         "scheduler": scheduler, "overwrite": overwrite, "resume": resume, "seconds": seconds,
     }  # fmt: skip
-    _sweep(read, asked, options, table, json_wanted)
+    _sweep(read, asked, options, others, json_wanted)
 
 
-def _sweep(study: Any, asked: Any, options: dict[str, Any], table: Path | None, json_wanted: bool) -> None:
+def _sweep(study: Any, asked: Any, options: dict[str, Any], others: list[Path], json_wanted: bool) -> None:
     """Run a sweep, print what came of it, and end with the exit status that says so."""
+    from suboctave.pictures.report import write_report
     from suboctave.progress import bar
     from suboctave.study.screen import console
     from suboctave.study.shown import print_sweep, sweep_as_plain
@@ -319,7 +332,12 @@ def _sweep(study: Any, asked: Any, options: dict[str, Any], table: Path | None, 
 
     with bar("sweep") as report:
         result = sweep(study, asked, progress=report, **options)
-    files = [options["path"], *([] if table is None else [result.to_csv(table, overwrite=True)])]
+    table, picture, page = others
+    files = [options["path"], result.to_csv(table, overwrite=True)]
+    if len(result.failures) < len(result):
+        result.plot(picture)
+        write_report({"sweep": result}, page, title=result.title or "Sweep", overwrite=True)
+        files += [picture, page]
     screen = console(quiet=json_wanted)
     print_sweep(screen, result)
     for file in files:

@@ -292,7 +292,9 @@ class Noting:
     def __init__(self, journal: Journal, name: str, key: str, allow_code: bool = False, progress: Any = None) -> None:
         self.journal, self.name, self.key, self.allow_code, self.progress = journal, name, key, allow_code, progress
         self.since = perf_counter()
-        self.points = self.events = 0
+        #: of the curve that is followed: itself, its number, its points and events that are written down
+        self.trace: Any = None
+        self.number, self.points, self.events = -1, 0, 0
         self._own = [record for record in journal.records if record.fields.get("key") == key]
         self._branches = {(r.fields["parent"], r.fields["event"]): r for r in self._own if r.kind == "branch"}
 
@@ -339,6 +341,8 @@ class Noting:
     def followed(self, trace: Any) -> None:
         """Called at each point of a curve with what there is of it so far, which is written down now and then."""
         now = perf_counter()
+        if trace is not self.trace:
+            self.trace, self.number, self.points, self.events = trace, self.number + 1, 0, 0
         events = len(trace.bifurcations)
         if now - self.since < _OFTEN and events == self.events:
             return
@@ -346,6 +350,7 @@ class Noting:
         points, located = trace.points[self.points :], trace.bifurcations[self.events :]
         fields = {
             "name": self.name,
+            "curve": self.number,
             "from": self.points,
             "omega": [point.orbit.omega for point in points],
             "values": [dict(point.orbit.values) for point in points],
@@ -371,6 +376,12 @@ class Recovered:
     bifurcations: int = 0
     events: list[tuple[str, float, float]] = field(default_factory=list)
     branches: int | None = None
+    #: points of the curves that are being followed, whose `events` are not among the bifurcations yet
+    under_way: int = 0
+
+    def over(self) -> None:
+        """What is under way is complete, and counted by its record; or it is begun anew."""
+        self.events, self.under_way = [], 0
 
 
 def recovered(path: str | Path) -> list[Recovered]:
@@ -384,12 +395,12 @@ def recovered(path: str | Path) -> list[Recovered]:
         name = str(fields["name"])
         item = analyses.setdefault(name, Recovered(name))
         if kind == "points":
-            if not fields["from"]:
-                item = analyses[name] = Recovered(name)
-            item.points += len(fields["omega"])
+            if not fields["from"] and not fields["curve"]:
+                item.over()
+            item.under_way += len(fields["omega"])
             item.events += [(kind, omega, amplitude) for kind, omega, _, amplitude in fields["bifurcations"]]
-            item.bifurcations = len(item.events)
             continue
+        item.over()
         sizes = record.dataset.sizes
         if kind != "analysis":
             item.branches = (item.branches or 0) + 1
@@ -400,4 +411,7 @@ def recovered(path: str | Path) -> list[Recovered]:
             item = analyses[name] = Recovered(name, "finished")
         item.points += int(sizes.get("point", sizes.get("row", 0) if kind == "analysis" else 0))
         item.bifurcations += int(sizes.get("event", 0))
+    for item in analyses.values():
+        item.points += item.under_way
+        item.bifurcations += len(item.events)
     return list(analyses.values())

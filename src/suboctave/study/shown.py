@@ -26,6 +26,8 @@ from suboctave.study.sweeps.result import Sweep
 if TYPE_CHECKING:
     from rich.console import Console
 
+#: points of a sweep that are printed
+_POINTS = 20
 #: bifurcations of a diagram up to which all of them are listed below its tree
 _LISTED = 40
 
@@ -137,7 +139,14 @@ def _in_one_line(branch: Branch) -> str:
 
 @_print.register(Table)
 def _(table: Table, out: Console, note: str) -> None:
-    """The columns that fit, the longest texts below it."""
+    """The columns that fit, and which do not."""
+    left_out = _fitting(table, out, note)
+    if left_out:
+        out.print(f"not shown: {', '.join(left_out)} (--csv writes everything)")
+
+
+def _fitting(table: Table, out: Console, note: str) -> list[str]:
+    """Print the columns that fit; the names of the others."""
     out.print(f": {table.title}{note}")
     shown: dict[str, list[str]] = {}
     room = out.width
@@ -150,9 +159,7 @@ def _(table: Table, out: Console, note: str) -> None:
     kinds = [name for name in shown if table[name].dtype.kind in "OU"]
     if shown:
         print_texts(out, list(shown), list(zip(*shown.values(), strict=True)), left=kinds)
-    left_out = [name for name in table.columns if name not in shown]
-    if left_out:
-        out.print(f"not shown: {', '.join(left_out)} (--csv writes everything)")
+    return [name for name in table.columns if name not in shown]
 
 
 def _number(value: Any) -> str:
@@ -168,10 +175,18 @@ def _number(value: Any) -> str:
 
 
 def print_sweep(out: Console, sweep: Sweep) -> None:
-    """How many points, what failed, and of each quantity the least, median and largest value."""
+    """The table of its points, of each quantity the least, median and largest value, and what failed."""
     out.print(sweep.title or "sweep", style="bold", end="")
     note = f" in {sweep.seconds:.2f} s" if sweep.seconds == sweep.seconds else ""
-    _print(sweep.summary(), out, note)
+    table = sweep.points_table()
+    shown = {name: column[:_POINTS] for name, column in table.columns.items()}
+    left_out = _fitting(Table(shown, table.title), out, note)
+    cut = [f"the first {_POINTS} of {len(table)} points"] * (len(table) > _POINTS)
+    cut += [f"{len(left_out)} further columns in the .csv file"] * bool(left_out)
+    if cut:
+        out.print("; ".join(cut))
+    out.print("\nquantities", style="bold", end="")
+    _print(sweep.summary(), out, "")
     for line in sweep.failure_lines():
         out.print(f"failed at {line}", soft_wrap=True)
 

@@ -22,6 +22,7 @@ from suboctave.study.screen import significant
 if TYPE_CHECKING:
     import xarray
 
+    from suboctave.progress import Report
     from suboctave.study.file import Study
 
 #: seconds after which the page asks again
@@ -43,6 +44,8 @@ class Watching:
         self.since = perf_counter()
         self.ended: str | None = None
         self.under_way = ""
+        #: of what is under way the share that is done, and in words where it is
+        self.share, self.where = 0.0, ""
         self.over: dict[str, Finished] = {}
         self._lock = threading.Lock()
         #: pictures by analysis, with the sizes of the curves that they show
@@ -50,7 +53,17 @@ class Watching:
 
     def begin(self, name: str) -> None:
         """An analysis is begun."""
-        self.under_way = name
+        self.under_way, self.share, self.where = name, 0.0, ""
+
+    def reporting(self, report: Report) -> Report:
+        """Reports of the analysis under way, for the page and for another reader."""
+
+        def both(share: float, where: str = "") -> None:
+            # what is done in several parts begins each of them anew
+            self.share, self.where = max(self.share, share), where
+            report(share, where)
+
+        return both
 
     def note(self, item: Finished) -> None:
         """An analysis is over."""
@@ -81,13 +94,13 @@ class Watching:
         rows = []
         for step in self.study.steps:
             item, over = known.get(step.name), self.over.get(step.name)
-            state = "waiting"
+            state, share = "waiting", None
             if over is not None:
                 state = f"failed: {over.failure}" if over.failure else f"finished in {over.seconds:.2f} s"
             elif step.name == self.under_way:
-                state = "running"
+                state, share = self.where or "running", self.share
             numbers = ("", "") if item is None else (str(item.points), str(item.bifurcations))
-            rows.append((step.name, step.kind, state, *numbers))
+            rows.append((step.name, step.kind, share, state, *numbers))
         events = [
             (name, kind, significant(omega, 9), significant(amplitude, 7))
             for name, item in known.items()
@@ -115,22 +128,24 @@ class Watching:
 def curves_so_far(path: Path, dof: int) -> dict[str, list[xarray.Dataset]]:
     """The response curves that a journal holds, by analysis; of those under way amplitudes are of samples."""
     curves: dict[str, list[xarray.Dataset]] = {}
-    begun: dict[str, list[dict[str, Any]]] = {}
+    begun: dict[str, dict[int, list[dict[str, Any]]]] = {}
     for record in read_journal(path):
         name = str(record.fields.get("name", ""))
         if record.kind == "points":
+            number = int(record.fields["curve"])
             if not record.fields["from"]:
-                begun[name] = []
-            begun[name].append(dict(record.fields))
+                begun[name] = {k: parts for k, parts in begun.get(name, {}).items() if k < number}
+            begun[name].setdefault(number, []).append(dict(record.fields))
         elif record.kind in ("branch", "analysis"):
             dataset = record.dataset
             begun.pop(name, None)
             if dataset.attrs.get("contents") == "branch" and not dataset.attrs.get("tracked"):
                 curves.setdefault(name, []).append(dataset)
-    for name, parts in begun.items():
-        curve = _of_points(parts, dof)
-        if curve is not None:
-            curves.setdefault(name, []).append(curve)
+    for name, several in begun.items():
+        for parts in several.values():
+            curve = _of_points(parts, dof)
+            if curve is not None:
+                curves.setdefault(name, []).append(curve)
     return {name: own[-_CURVES:] for name, own in curves.items() if own}
 
 

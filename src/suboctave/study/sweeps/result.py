@@ -15,6 +15,7 @@ from suboctave.arguments import checked
 from suboctave.errors import InputError, suggest
 from suboctave.harmonic.linear_part import LinearPart
 from suboctave.interruption import Interruption
+from suboctave.pictures.cells import Pictured
 from suboctave.store.layout import parameter_column
 from suboctave.store.registry import Codec, Datasets, Stored, register
 from suboctave.store.table import Table, write_csv
@@ -28,6 +29,11 @@ if TYPE_CHECKING:
 OWN = ("failure", "seconds", "point", "event", "isola", "row")
 #: what `failure` says of a point that has not been computed
 MISSING = "not computed"
+#: quantities that are drawn unless they are named
+_DRAWN = 4
+#: how names of quantities end that say how a curve was computed, and of the others those that say most of a design
+_OF_COMPUTING = ("points", "regular", "closed", "residual", "neglected", "unsettled", "rows", "branches")
+_TELLING = ("isolas", "peak_amplitude", "longest_period", "LP", "PD", "NS", "BP", "peak_omega", "unstable_share")
 #: different failures that are printed
 _SHOWN = 5
 
@@ -43,7 +49,7 @@ class Computed:
 
 @checked(result=True)
 @dataclass(eq=False, repr=False)
-class Sweep(Stored):
+class Sweep(Stored, Pictured):
     """A study at many values of its parameters.
 
     Attributes
@@ -114,6 +120,54 @@ class Sweep(Stored):
         frame = self.to_dataframe()
         return Table({str(name): frame[name].to_numpy() for name in frame.columns}, self.words)
 
+    def points_table(self, quantities: Sequence[str] | None = None) -> Table:
+        """One row per point: the parameters, `quantities` (default: all that are not the same at every point), and in
+        words what failed, if anything did.
+        """
+        frame = self.to_dataframe()
+        own = [parameter_column(name, OWN) for name in self.parameters]
+        names = [*own, *(self.varying(frame) if quantities is None else self._chosen(quantities, frame))]
+        names += ["failure"] if self.failures else []
+        return Table({str(name): frame[name].to_numpy() for name in names}, self.words)
+
+    def varying(self, frame: pandas.DataFrame | None = None) -> list[str]:
+        """The columns of `to_dataframe` that are not the same at every point, those first that say most of a design:
+        a user's own measures, isolas, amplitudes, bifurcations.
+        """
+        table = self.to_dataframe() if frame is None else frame
+        own = {parameter_column(name, OWN) for name in self.parameters} | {"failure", "seconds"}
+        names = [str(name) for name in table.columns if name not in own and table[name].nunique(dropna=False) > 1]
+        return sorted(names, key=_rank)
+
+    def _chosen(self, quantities: Sequence[str], frame: pandas.DataFrame) -> list[str]:
+        """The names of columns that were asked for; InputError, with a suggestion, for one that is none."""
+        chosen = [quantities] if isinstance(quantities, str) else list(quantities)
+        for name in chosen:
+            if name not in frame.columns:
+                raise InputError(f"the sweep has no quantity {name!r}{suggest(str(name), [*map(str, frame.columns)])}")
+        return chosen
+
+    def plot(self, path: Any = None, **options: Any) -> Any:
+        """Draw it: `quantities` over one parameter, as maps over two, as a matrix of scatter plots over more.
+
+        `quantities`: columns of `to_dataframe` (default: the first four of `varying`); `title`; `size`: width and
+        height in inches, or the name of one. Saved if a path is given (.png, .svg, .pdf).
+        """
+        from suboctave.pictures.sweeps import plot_points
+
+        frame = self.to_dataframe()
+        asked = options.pop("quantities", None)
+        names = (self.varying(frame)[:_DRAWN] or self._still(frame)) if asked is None else self._chosen(asked, frame)
+        if not names:
+            raise InputError("the sweep has no quantity that could be drawn: every point failed")
+        columns = {str(name): frame[name].to_numpy() for name in frame.columns}
+        own = [parameter_column(name, OWN) for name in self.parameters]
+        return plot_points(columns, own, names, path, **{"title": self.title or None, **options})
+
+    def _still(self, frame: pandas.DataFrame) -> list[str]:
+        """Where nothing varies the first quantity."""
+        return [str(name) for name in frame.columns if str(name) in self.quantities][:1]
+
     def to_csv(self, path: str | Path, overwrite: bool = False) -> Path:
         """The same as comma-separated text (.csv), all digits kept."""
         return write_csv(self.to_dataframe(), path, overwrite)
@@ -151,6 +205,16 @@ class Sweep(Stored):
             where = f"point {numbers[0]}" if len(numbers) == 1 else f"{len(numbers)} points, the first {numbers[0]}"
             lines.append(f"{where}: {textwrap.shorten(text, 300)}")
         return [*lines, f"and {len(points) - _SHOWN} other failures"] if len(points) > _SHOWN else lines
+
+
+def _rank(name: str) -> int:
+    """Smaller for a quantity that says more of a design."""
+    if "." not in name:  # a user's own measure
+        return -1
+    what = name.rpartition(".")[2]
+    if what in _TELLING:
+        return _TELLING.index(what)
+    return len(_TELLING) + (what in _OF_COMPUTING)
 
 
 # ------------------------------------------------------------------------------------------------------------- files
