@@ -13,10 +13,11 @@ import numpy as np
 import pytest
 import xarray
 
+import suboctave as so
 from suboctave.errors import InputError
 from suboctave.pictures.browser import figure_data
 from suboctave.pictures.drawing import Axis, Drawing, Entry, Frame, Polyline, Raster
-from suboctave.pictures.points import verified_by
+from suboctave.pictures.points import DETAILS, curve_data, verified_by
 from suboctave.pictures.report import write_report
 from suboctave.pictures.style import Pen
 from suboctave.store.layout import curve_dataset
@@ -146,6 +147,35 @@ def test_curves_over_different_parameters_and_tables(page, duffing):
     assert [f["layout"]["xaxis"]["title"]["text"] for f in figures] == ["forcing frequency ω", "p"]
     assert [f["axes"] for f in figures] == [["omega", "quantity"], ["p", "quantity"]]
     assert {"0.500000 +0.250000i", "fine"} <= set(read.cells)
+
+
+def test_what_found_nothing_takes_a_line(page, duffing, tmp_path):
+    none = xarray.Dataset({"omega": ("row", np.zeros(0))}, attrs={"title": "no shape was found"})
+    bare = curve_dataset(np.zeros(0), np.zeros(0), ended="the first motion was not found")
+    path = write_report({"curve": duffing(), "shapes": none, "other": bare}, tmp_path / "nothing.html")
+    text = path.read_text(encoding="utf-8")
+    assert '<p class="nothing">Found nothing: shapes: no shape was found</p>' in text
+    assert '<p class="nothing">Found nothing: other: the first motion was not found</p>' in text
+    assert text.count("<section") == 3  # the summary, the curve, where numbers come from
+
+
+def test_a_page_has_a_bounded_size():
+    """From all of the motions to none: each step is smaller, and says what is missing."""
+    system = so.System(
+        np.eye(3), 0.1 * np.eye(3), np.diag([2.0, 2.0, 2.0]) - np.eye(3, k=1) - np.eye(3, k=-1),
+        loads=[so.HarmonicLoad(dof=0, amplitude=0.5)],
+        elements=[so.ElasticStop(dof=1, stiffness=2.0, gap=0.3)],
+    )  # fmt: skip
+    data = so.frequency_response(system, omega=(1.5, 1.2), harmonics=5).to_xarray(motions=True).assign_attrs(number=0)
+    sizes = [detail.size(data) for detail in DETAILS]
+    assert sizes == sorted(set(sizes), reverse=True)
+    assert sizes[-1] == 0
+    for detail, size in zip(DETAILS, sizes, strict=True):
+        curve = curve_data(detail.of(data), "curve")
+        texts = [places.get(name, "") for places in (curve["points"], curve["events"]) for name in ("motion", "force")]
+        assert sum(map(len, texts)) == pytest.approx(size, abs=16)
+        assert bool(detail.words) == (size < sizes[0])
+    assert [one["label"] for one in curve_data(DETAILS[2].of(data), "curve")["signals"]] == ["x_0", "x_1"]
 
 
 def test_an_existing_file_is_left_alone(duffing, tmp_path):

@@ -18,6 +18,7 @@ from pages import blocks, check_prints
 from scipy import stats
 
 import suboctave as so
+from suboctave.pictures.sweeps import plot_points
 from suboctave.store.journal import Journal, read_journal
 from suboctave.study.file import read_study
 from suboctave.study.sweeps.given import parameters_of
@@ -423,9 +424,48 @@ bounds = [0.1, 0.2]
 """
 
 
+# ------------------------------------------------------------------------------------------------- table and figure
+def test_the_table_of_points_has_what_varies(grid):
+    table, whole = grid.points_table(), grid.to_dataframe()
+    assert list(table.columns)[:3] == ["F", "c", "response.peak_amplitude"]
+    for name in whole.columns:
+        told = name in table.columns
+        assert told == (whole[name].nunique(dropna=False) > 1 and name != "seconds"), name
+        if told:
+            np.testing.assert_array_equal(table[name], whole[name])
+    assert list(grid.points_table(["response.LP"]).columns) == ["F", "c", "response.LP"]
+    with pytest.raises(so.InputError, match=r"response\.LP"):
+        grid.points_table(["response.PL"])
+
+
+def test_the_figure_follows_the_number_of_parameters(grid):
+    quantity = "response.peak_amplitude"
+    frame = grid.to_dataframe()
+    # two: a map, whose cells are the points
+    axes = grid.plot(quantities=[quantity, "response.LP"]).axes
+    (cells,) = axes[0].collections
+    np.testing.assert_array_equal(np.asarray(cells.get_array()), frame[quantity].to_numpy().reshape(4, 3).T)
+    assert (axes[0].get_xlabel(), axes[0].get_ylabel()) == ("F", "c")
+    # one: joined in its order; more: a row for each quantity, a column for each parameter
+    columns = {name: frame[name].to_numpy() for name in frame.columns}
+    (line,) = plot_points({name: values[::-1] for name, values in columns.items()}, ["F"], [quantity]).axes[0].lines
+    assert np.all(np.diff(line.get_xdata()) >= 0.0)
+    columns["k"] = columns["F"] * columns["c"]
+    figure = plot_points(columns, ["F", "c", "k"], [quantity, "response.LP"])
+    shown = {(one.get_subplotspec().rowspan.start, one.get_subplotspec().colspan.start): one for one in figure.axes}
+    assert len(shown) == 6
+    assert [shown[1, i].get_xlabel() for i in range(3)] == ["F", "c", "k"]
+    assert [shown[i, 0].get_ylabel() for i in range(2)] == [quantity, "response.LP"]
+    np.testing.assert_array_equal(np.sort(shown[0, 2].lines[0].get_xdata()), np.sort(columns["k"]))
+    # a point without a value is shown where it is
+    columns[quantity] = np.where(columns["F"] > 0.35, np.nan, columns[quantity])
+    crosses = plot_points(columns, ["F", "c"], [quantity]).axes[0].lines[0]
+    assert set(crosses.get_xdata()) == {0.4}
+
+
 # ----------------------------------------------------------------------------------------------------- the command line
 def test_the_command_line_sweeps_shows_and_goes_on(study, grid, study_file, suboctave, tmp_path):
-    path = study_file(STUDY + "[outputs]\ncsv = true\n")
+    path = study_file(STUDY)
     options = ("--grid", "F=0.1:0.4:4", "--grid", "c=0.3", "--workers", "1")
     status, out, err = suboctave("sweep", path, *options)
     assert status == 0, err
@@ -434,6 +474,13 @@ def test_the_command_line_sweeps_shows_and_goes_on(study, grid, study_file, subo
     found = so.load(folder / "sweep.nc")
     assert found.dataset["response.LP.omega"].identical(grid.dataset["response.LP.omega"].isel(c=[2]))
     assert len((folder / "sweep.csv").read_text().splitlines()) == 5
+    assert (folder / "sweep.png").read_bytes().startswith(b"\x89PNG")
+    page = (folder / "sweep.html").read_text(encoding="utf-8")
+    assert page.count("<tr><td>") == 4  # a row for each point
+    assert "4 points over F, c" in page
+    assert "Picture of sweep" in page
+    rows = [line.split()[:2] for line in out.splitlines()]
+    assert [row for row in rows if row[1:] == ["0.3"]] == [[force, "0.3"] for force in ("0.1", "0.2", "0.3", "0.4")]
     status, _, err = suboctave("sweep", path, *options)
     assert (status, "left as it is" in err) == (2, True)
     assert suboctave("sweep", path, *options, "--resume")[0] == 0

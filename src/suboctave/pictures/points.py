@@ -18,6 +18,7 @@ from suboctave.pictures.boundary import kind_of, plane_of
 from suboctave.pictures.given import is_boundary
 from suboctave.pictures.strokes import number_of
 from suboctave.pictures.style import period_of
+from suboctave.pictures.tables import observed_label
 from suboctave.store.layout import coordinate
 from suboctave.units import UnitSystem
 
@@ -204,12 +205,8 @@ def _units(dataset: xarray.Dataset) -> dict[str, str]:
 
 def _signals(dataset: xarray.Dataset) -> dict[str, Any]:
     """The displacements and the elements whose motions and forces the page has, by name; how many DOFs it has not."""
-    observed, dofs = (int(dataset.attrs.get(name, i)) for i, name in enumerate(("observed_dof", "dofs")))
-    labels, numbers, elements = (
-        [str(dataset.attrs.get("dof_name", "x" if dofs == 1 else f"x_{observed}"))],
-        [observed],
-        [],
-    )
+    labels, numbers = [observed_label(dataset)], [int(dataset.attrs.get("observed_dof", 0))]
+    elements: list[str] = []
     if "signal_label" in dataset:
         labels, numbers = (dataset[f"signal_{name}"].to_numpy().tolist() for name in ("label", "dof"))
         elements = [str(label) for label in dataset["element_label"].to_numpy()]

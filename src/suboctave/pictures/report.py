@@ -190,7 +190,7 @@ def _datasets(name: str, item: Any) -> dict[str, xarray.Dataset]:
             given = given.assign_attrs(seconds=float(seconds))
     elif hasattr(item, "to_xarray") and not isinstance(item, xarray.Dataset):
         given = item.to_xarray()
-    every = given if isinstance(given, dict) and given else {"": given}
+    every = given if isinstance(given, dict) else {"": given}
     for dataset in every.values():
         if not isinstance(dataset, xarray.Dataset):
             raise InputError(

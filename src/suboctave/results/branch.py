@@ -376,13 +376,11 @@ class Branch(CurveTables, BranchReadings):
         from suboctave.store.layout import branch_dataset, events_met
         from suboctave.store.motions import elements_of, with_motions
 
-        if motions:
-            own = (
-                self.available_readings() if readings is True else [readings] if isinstance(readings, str) else readings
-            )
-            readings = [*(own or ()), *(f"peak_force_{index}" for index in elements_of(self.system))]
         dataset = with_readings(branch_dataset(self), self, events_met(self), readings)
-        return with_motions(dataset, self) if motions else dataset
+        if not motions:
+            return dataset
+        forces = [f"peak_force_{index}" for index in elements_of(self.system)]
+        return with_motions(with_readings(dataset, self, events_met(self), forces), self)
 
     def to_dataframe(self, readings: Readings = False) -> pandas.DataFrame:
         """One row per point: free parameters, amplitude, stability, leading multiplier, errors; read-offs on request.

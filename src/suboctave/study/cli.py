@@ -390,14 +390,13 @@ def show(
 def _show_page(path: Path, allow_code: bool) -> None:
     """Serve the page of a results file until Ctrl-C."""
     from suboctave.pictures.report import page_of
-    from suboctave.study.outputs import shown_on_page
     from suboctave.study.results import Results, load
     from suboctave.study.screen import console
     from suboctave.study.served import served, show_in_browser, wait_for_ctrl_c
 
     results, called = load(path, allow_code=allow_code), printable(path.stem)
-    shown = shown_on_page(results) if isinstance(results, Results) else {called: results}
-    if not shown:
+    shown = results if isinstance(results, Results) else {called: results}
+    if not len(shown):
         raise InputError(f"{path} holds nothing that a page could show")
     title = str(results.attributes.get("title") or called) if isinstance(results, Results) else called
     text = page_of(shown, title)

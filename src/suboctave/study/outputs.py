@@ -15,7 +15,7 @@ from suboctave.errors import InputError, Key
 from suboctave.maps.isolas.result import Isolas
 from suboctave.pictures.paper import SUFFIXES
 from suboctave.store.table import Table
-from suboctave.study.figures import StudyCurves, drawable
+from suboctave.study.figures import StudyCurves
 from suboctave.study.mistakes import Section
 from suboctave.study.results import Result, Results
 from suboctave.study.steps import Step
@@ -119,19 +119,14 @@ def write_outputs(
         except InputError as error:
             missing.append(f"outputs.figures[{index}] is not drawn: {error}")
     path = folder / (outputs.html or "")
-    if outputs.html is not None and path not in left and any(drawable(item) for item in results.values()):
+    if outputs.html is not None and path not in left and len(results):
         from suboctave.pictures.report import write_report
 
-        write_report(shown_on_page(results), path, title=title or "Study", overwrite=True, failures=failures)
+        write_report(results, path, title=title or "Study", overwrite=True, failures=failures)
         yield path
     if missing:
         rest = "everything else is written; change the figure, and go on with --resume"
         raise InputError("; ".join([*missing, rest]))
-
-
-def shown_on_page(results: Results) -> dict[str, Any]:
-    """The results that a page shows: all that are not empty; of isolas that none was found is said."""
-    return {name: item for name, item in results.items() if isinstance(item, Isolas) or len(item)}
 
 
 def tables_of(name: str, item: Result, folder: Path) -> Iterator[tuple[Path, Callable[..., Path]]]:

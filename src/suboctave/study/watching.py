@@ -14,7 +14,6 @@ from suboctave.pictures.report import page_of, template
 from suboctave.pictures.sections import picture_of
 from suboctave.store.journal import read_journal
 from suboctave.store.layout import EventRow, curve_dataset
-from suboctave.study.outputs import shown_on_page
 from suboctave.study.results import Results
 from suboctave.study.runner import JOURNAL, Finished, Outcome, recovered
 from suboctave.study.screen import significant
@@ -73,9 +72,8 @@ class Watching:
     def finish(self, outcome: Outcome) -> None:
         """The run is over: from now on its report is shown, or what failed."""
         title, results = self.study.title or self.study.called, Results(outcome.results)
-        shown, failures = shown_on_page(results), outcome.failures
-        if shown:
-            self.ended = page_of(shown, title, failures)
+        if len(results):
+            self.ended = page_of(results, title, outcome.failures)
 
     def page(self) -> str:
         """The page as it is now."""

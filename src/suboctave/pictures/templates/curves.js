@@ -186,7 +186,9 @@ function csvName() {
 function csvOfCurves(wanted) {
   const known = wanted.flatMap((n) => [...Object.keys(curveOf(n).points.values), ...Object.keys(curves[n].fixed)]);
   const names = [...new Set(known)], also = usual() ? [] : [csvName()];
-  const rows = [["curve", "point", "event", ...names, "amplitude", ...also, "stable", "multiplier_real", "multiplier_imag",
+  const units = curves[wanted[0]].units, heads = names.flatMap((name) => (name !== "omega" || !units.omega ? [name]
+    : [withUnit(name, units.omega), withUnit("frequency", units.cycles)]));
+  const rows = [["curve", "point", "event", ...heads, withUnit("amplitude", units.length), ...also, "stable", "multiplier_real", "multiplier_imag",
     "residual", "error"]];
   for (const number of wanted) {
     const curve = curveOf(number);
@@ -194,7 +196,8 @@ function csvOfCurves(wanted) {
     for (const vertex of along) {
       const place = placeOf(curve, vertex), [re, im] = place.multipliers[0] || [NaN, NaN];
       rows.push([curve.name, vertex < 0 ? "" : vertex, vertex < 0 ? curve.events.kind[-1 - vertex] : "",
-        ...names.map((name) => place.values[name]), place.amplitude,
+        ...names.flatMap((name) => (name !== "omega" || !units.omega ? [place.values[name]]
+          : [place.values[name], place.values[name] / (2 * Math.PI)])), place.amplitude,
         ...also.map(() => shownAt(curve, vertex, "quantity")), place.stable === null ? "" : place.stable,
         re, im, place.residual, place.error]);
     }
