@@ -95,9 +95,7 @@ def finished(drawing: Drawing, sheet: style.Sheet, path: str | Path | None, opti
     return save_or_show(drawing, sheet, path)
 
 
-def save_or_show(
-    drawing: Drawing | Callable[[Figure], None], sheet: style.Sheet, path: str | Path | None
-) -> Figure:
+def save_or_show(drawing: Drawing | Callable[[Figure], None], sheet: style.Sheet, path: str | Path | None) -> Figure:
     """The figure of a drawing, or of what fills one, saved where a path is given; else at a prompt in a window, where
     there is a screen.
     """
