@@ -177,7 +177,7 @@ def _alone(name: str, contents: Contents, item: Any, drawn: set[int]) -> Section
         return _isolas(name, head, curves, contents, drawn)
     if list(curves) != [""]:  # all branches of a diagram in one figure
         figure = _responses(curves, getattr(item, "legend", None))
-        each = [Curve(f"branch {label}", data) for label, data in curves.items()]
+        each = [Curve(f"{name}, branch {label}", data) for label, data in curves.items()]
         return Section(name, [name], figures=[figure], tree=str(item), curves=each)
     (dataset,) = curves.values()
     heading = str(dataset.attrs.get("title", ""))
@@ -212,7 +212,7 @@ def _isolas(
         drawing = space_drawing(list(group.values()), x="omega", y=parameter, names=list(group))
         words = f"Closed branches over ω and {parameter}"
         figures.append(figure_from(drawing, f"{file_name}_space", words, folded="In space"))
-    each = [Curve(label, data) for label, data in {**bounds, **closed}.items()]
+    each = [Curve(f"{name}, {label}", data) for label, data in {**bounds, **closed}.items()]
     sentences, notes = notes_on_isolas(head)
     texts: dict[str, Any] = {"before": [str(head.attrs.get("said", ""))], "after": sentences, "notes": notes}
     return Section(name, [name], table=isolas_table(head, closed), figures=figures, curves=each, **texts)

@@ -395,7 +395,7 @@ def recovered(path: str | Path) -> list[Recovered]:
         name = str(fields["name"])
         item = analyses.setdefault(name, Recovered(name))
         if kind == "points":
-            if not fields["from"] and not fields["curve"]:
+            if not fields["from"] and not fields.get("curve"):
                 item.over()
             item.under_way += len(fields["omega"])
             item.events += [(kind, omega, amplitude) for kind, omega, _, amplitude in fields["bifurcations"]]

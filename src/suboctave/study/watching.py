@@ -130,7 +130,7 @@ def curves_so_far(path: Path, dof: int) -> dict[str, list[xarray.Dataset]]:
     for record in read_journal(path):
         name = str(record.fields.get("name", ""))
         if record.kind == "points":
-            number = int(record.fields["curve"])
+            number = int(record.fields.get("curve", 0))
             if not record.fields["from"]:
                 begun[name] = {k: parts for k, parts in begun.get(name, {}).items() if k < number}
             begun[name].setdefault(number, []).append(dict(record.fields))
