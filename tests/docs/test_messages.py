@@ -134,7 +134,7 @@ def _sentences(module: str) -> list[str]:
             left_out.add(id(node.body[0].value))
         if isinstance(node, ast.JoinedStr):
             left_out |= {id(part) for part in node.values}
-        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "InputError":
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") in ("InputError", "refuse_idle"):
             left_out |= {id(part) for part in ast.walk(node)}
     found = (_text(node) for node in ast.walk(tree) if id(node) not in left_out and not isinstance(node, ast.BinOp))
     return [text for text in found if text and len(re.findall(r"[a-z]{2,}", text)) >= 6]
