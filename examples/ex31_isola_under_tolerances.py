@@ -35,7 +35,7 @@ print(f"{there.sum()} of {draws} oscillators have the isola: between {interval.l
 
 # The birth of the isola over the gap, followed over the stiffness.
 system = so.library.reference_oscillator(p=load, j=0.58, Kc=4.7)
-(isola,) = so.find_isolas(system, (2.1, 2.6), "j", (0.57, 0.59), harmonics=7, values=2)
+(isola,) = so.find_isolas(system, (2.25, 2.45), "j", (0.57, 0.59), harmonics=7, values=2)
 births = so.track(isola.born, "Kc", (4.5, 4.9), max_step=0.05)
 order = np.argsort(births.parameter("Kc"))
 stiffness, gap = births.parameter("Kc")[order], births.parameter("j")[order]

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from event_tables import against_recorded, recording
-from overlaps import overlapping_texts, written_figures
+from overlaps import labels_on_curves, overlapping_texts, written_figures
 
 FOLDER = Path(__file__).parents[2] / "examples"
 SCRIPTS = sorted(FOLDER.glob("ex*.py"))
@@ -52,4 +52,4 @@ def test_example(script, tmp_path, monkeypatch, capsys):
     assert not against_recorded(script.stem, tables)
     assert [path.name for path in tmp_path.iterdir()] == [f"{script.stem}.png"]
     assert f"figure: {script.stem}.png" in capsys.readouterr().out
-    assert [overlapping_texts(figure) for figure in figures] == [[]]
+    assert [(overlapping_texts(figure), labels_on_curves(figure)) for figure in figures] == [([], [])]

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from event_tables import against_recorded, recording
-from overlaps import overlapping_texts, written_figures
+from overlaps import labels_on_curves, overlapping_texts, written_figures
 
 FOLDER = Path(__file__).parents[2] / "examples" / "gallery"
 SCRIPTS = sorted(FOLDER.glob("fig*.py"))
@@ -39,7 +39,7 @@ def test_figure(script, tmp_path, monkeypatch):
     names = ["figure.png", "space.png"] if several else ["figure.png"]
     with recording() as tables, written_figures() as figures:
         run(script, names, monkeypatch)
-    assert [overlapping_texts(figure) for figure in figures] == [[] for _ in names]
+    assert [(overlapping_texts(figure), labels_on_curves(figure)) for figure in figures] == [([], []) for _ in names]
     assert not against_recorded(script.stem, tables)
     assert sorted(path.name for path in tmp_path.iterdir()) == names
 

@@ -7,6 +7,7 @@ import re
 
 import numpy as np
 import pytest
+from overlaps import labels_on_curves
 
 from suboctave.errors import InputError
 from suboctave.pictures import plot, plot_boundaries, plot_space, style
@@ -130,6 +131,7 @@ def test_points_are_marked_and_named_and_names_do_not_overlap():
         assert {kind for kind in style.KINDS if lines(figure, kind)} == {"GPD", "extremum"}
         named = [text for text in figure.axes[0].texts if text.get_gid() == "label"]
         assert sorted(text.get_text() for text in named) == ["0.5000", "0.5000", "GPD", "GPD", "GPD", "GPD"]
+        assert labels_on_curves(figure) == []
         figure.draw_without_rendering()
         boxes = [text.get_window_extent() for text in named]
         for i, box in enumerate(boxes):

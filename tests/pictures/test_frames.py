@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from matplotlib import pyplot
-from overlaps import overlapping_texts
+from overlaps import labels_on_curves, overlapping_texts
 
 import suboctave as so
 from suboctave.errors import InputError
@@ -126,4 +126,4 @@ def test_events_upon_each_other_are_counted():
     events = [EventRow("LP", 3, 1.31 + 1e-4 * k, 1.31, 1e-12, 1.0 + 0j) for k in range(5)]
     figure = plot(curve_dataset(x, x, stable=np.ones(11, dtype=bool), events=events))
     assert [text.get_text() for text in figure.axes[0].texts] == ["5 events at 1.31"]
-    assert overlapping_texts(figure) == []
+    assert overlapping_texts(figure) == labels_on_curves(figure) == []

@@ -1,4 +1,4 @@
-"""Which texts of a figure lie on each other, as Matplotlib's renderer places them."""
+"""Which texts of a figure lie on each other or on curves, as Matplotlib's renderer places them."""
 
 from __future__ import annotations
 
@@ -28,6 +28,26 @@ def overlapping_texts(figure):
         for (one, a), (other, b) in combinations(seen, 2)
         if min(a.x1, b.x1) - max(a.x0, b.x0) > _MEET and min(a.y1, b.y1) - max(a.y0, b.y0) > _MEET
     ]
+
+
+def labels_on_curves(figure):
+    """The texts beside points that a line crosses, or that a marker lies in."""
+    figure.canvas.draw()
+    return [
+        text.get_text()
+        for axes in figure.axes
+        for text in axes.texts
+        if text.get_gid() == "label" and _crossed(axes, text.get_window_extent())
+    ]
+
+
+def _crossed(axes, box):
+    for line in axes.get_lines():
+        path = line.get_transform().transform_path(line.get_path())
+        drawn = line.get_linestyle() != "None"
+        if path.intersects_bbox(box, filled=False) if drawn else box.count_contains(path.vertices):
+            return True
+    return False
 
 
 def _unseen_ticks(figure):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from itertools import product
 from typing import TYPE_CHECKING, Any
@@ -27,7 +28,7 @@ _TALL = 0.7
 #: so that two columns fit into the width of a journal's column
 _TIGHT: dict[str, Any] = {"handlelength": 2.0, "handletextpad": 0.5, "columnspacing": 1.0}
 #: distances of a text from its point, nearest first; further away where everything near is taken
-_DISTANCES = (1.0, 2.4, 3.8)
+_DISTANCES = (1.0, 2.4, 3.8, 5.2)
 #: points kept clear between two texts, and, rather, between a text and the frame with its ticks
 _CLEAR, _TICKS = 1.5, 4.0
 _SIDES = ((1, 0), (-1, 0), (1, 1), (-1, 1), (1, -1), (-1, -1), (0, 1), (0, -1))
@@ -87,8 +88,9 @@ def box_of(sheet: style.Sheet) -> dict[str, Any]:
 def annotate(axes: Axes, labels: Sequence[Label], look: style.Look) -> None:
     """Write texts beside their places; the same text at the same place once.
 
-    Of the sides of a place the one is taken on which the text covers the fewest lines, markers and other texts, and is
-    not nearer to the place of another text.
+    Of the sides of a place the one is taken where the text is nearest and not nearer to the place of another text.
+    Where it would cover a line, a marker or another text on every side, or leave the frame, it is left out: the marker
+    and the legend say what is there.
     """
     unit, window, legend = axes.figure.dpi / 72.0, axes.get_window_extent(), axes.get_legend()
     taken = [] if legend is None else [legend.get_window_extent()]
@@ -103,22 +105,24 @@ def annotate(axes: Axes, labels: Sequence[Label], look: style.Look) -> None:
             continue
         done.append((label.text, point))
         at: dict[str, Any] = {"xy": label.at, "textcoords": "offset points", "annotation_clip": False}
-        costs = {}
+        costs: dict[Any, float] = {}
         for distance, (rank, (across, up)) in product(_DISTANCES, enumerate(_SIDES)):
             reach = distance * gap * (0.75 if across and up else 1.0)
             sides: dict[str, Any] = {"ha": ("center", "left", "right")[across], "va": ("center", "bottom", "top")[up]}
             note = axes.annotate(label.text, xytext=(reach * across, reach * up), **at, **sides, **looks)
             box = note.get_window_extent()
             overlaps = box.padded(_CLEAR * unit).count_overlaps(taken)
-            cost = 40.0 * _covered(axes, box) + 400.0 * (overlaps + _leaves(box, window))
+            covers = bool(_covered(axes, box) or overlaps or _leaves(box, window))
             own = _distance(box, point)
-            cost += 200.0 * any(_distance(box, there) < own for there in others)
-            costs[note] = cost + 25.0 * _leaves(box, window.padded(-_TICKS * unit)) + 0.1 * rank + 5.0 * distance
+            nearer = 200.0 * any(_distance(box, there) < own for there in others)
+            at_ticks = 25.0 * _leaves(box, window.padded(-_TICKS * unit))
+            costs[note] = math.inf if covers else nearer + at_ticks + 0.1 * rank + 5.0 * distance
         best = min(costs, key=lambda note: costs[note])
         for note in costs:
-            if note is not best:
+            if note is not best or math.isinf(costs[note]):
                 note.remove()
-        taken.append(best.get_window_extent())
+        if math.isfinite(costs[best]):
+            taken.append(best.get_window_extent())
 
 
 def _distance(box: Bbox, point: np.ndarray) -> float:
