@@ -1,5 +1,5 @@
 # make demo      responses, branches, a border and an isola of the reference oscillator: tables, pictures in ./demo
-# make test      lint, then the tests (a few minutes at most)
+# make test      lint, then the tests (about a quarter of an hour on two cores)
 # make test-all  lint, then all tests, the long ones too
 # make lint      ruff and mypy
 # make docs      the documentation as a site, docs/_build/html; runs the examples (some minutes the first time)
