@@ -11,7 +11,7 @@ j = 0.17713 the bubble shrinks to nothing, which the isola does not notice.
 from matplotlib.figure import Figure
 
 import suboctave as so
-from suboctave.pictures import View, draw_response, figure_file, save_figure
+from suboctave.pictures import figure_file, save_figure
 
 GAPS = (0.1740, 0.1760, 0.1768, 0.17682, 0.1769, 0.1771, 0.1772)
 RANGE = (2.1, 2.0)
@@ -38,14 +38,13 @@ for gap, response in zip(GAPS, responses, strict=True):
 
 figure = Figure(figsize=(11.0, 5.6), layout="constrained")
 frames = figure.subplots(2, 4, sharex=True, sharey=True).ravel()
-view = View(marks=["LP", "PD"])
 legend = {}
 for axes, gap, branches in zip(frames, GAPS, drawn, strict=False):
-    curves = [branch.to_xarray() for branch in branches]
-    legend |= draw_response(axes, curves, view=view, by_period=True)
+    so.plot(branches, ax=axes, xlim=WINDOW, ylim=(0.165, 0.265), marks=["LP", "PD"])
+    own = axes.get_legend()
+    legend |= dict(zip((text.get_text() for text in own.get_texts()), own.legend_handles, strict=True))
+    own.remove()
     axes.set_title(f"j = {gap:g}")
-    axes.set_xlim(*WINDOW)
-    axes.set_ylim(0.165, 0.265)
     axes.label_outer()
 frames[-1].axis("off")
 frames[-1].legend(legend.values(), legend.keys(), loc="center")
