@@ -8,6 +8,7 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from suboctave.arguments import checked
 from suboctave.errors import GivenDof
 
 if TYPE_CHECKING:
@@ -19,6 +20,7 @@ def answer(name: str) -> Any:
     return getattr(importlib.import_module(f"{__package__}.results.motion"), name)
 
 
+@checked(result=True)
 class Motion:
     """One periodic motion."""
 

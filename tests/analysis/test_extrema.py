@@ -174,7 +174,7 @@ def test_wrong_input_is_refused(folds):
         ("cc", (0.0, 1.0), "unknown parameter 'cc'"),
         (("q", "c"), (0.0, 1.0), "followed in one more parameter"),
         ("c", (0.2, 0.3), "the bifurcation has c=0.05, outside"),
-        ("c", 1.0, "bounds must be a list, not 1"),
+        ("c", 1.0, r"bounds must be two numbers \(from, to\)"),
     ):
         with pytest.raises(so.InputError, match=message):
             so.track(extremum, parameter, bounds)

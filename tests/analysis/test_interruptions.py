@@ -242,6 +242,7 @@ def test_a_time_limit_that_is_none_is_refused_before_anything_else(verb):
     assert given["seconds"].kind is inspect.Parameter.KEYWORD_ONLY
     needed = [p for p in given.values() if p.default is p.empty]
     sound = {"box": ((-1.0, 1.0), (-1.0, 1.0)), "parameter": "F", "values": (0.0, 1.0), "bounds": (0.5, 1.0)}
+    sound |= {"subharmonic": 3, "by": "F"}
     sound["omega"] = (0.5, 1.0) if verb in ("phase_resonance", "lyapunov_map") else 1.0
     positional = [sound.get(p.name) for p in needed if p.kind is p.POSITIONAL_OR_KEYWORD]
     named = {p.name: sound.get(p.name) for p in needed if p.kind is p.KEYWORD_ONLY}
@@ -339,9 +340,9 @@ def test_a_resonance_is_not_read_off_a_part_of_a_response(order, reach, ticks, m
         assert response(share * looks).interrupted if order == 1 else response(share * looks).interruption
 
     def part(*given, **options):
-        return verb(*given, **options, **more, progress=Stop(8))
+        return verb(*given, **options | more, progress=Stop(8))
 
-    monkeypatch.setattr(resonance, stage, lambda *given, **options: verb(*given, **options, **more))
+    monkeypatch.setattr(resonance, stage, lambda *given, **options: verb(*given, **options | more))
     for share in (0.8, 0.95):
         ticks.now = 0.0
         with pytest.raises(so.TimeLimitError, match="before there was a result to keep"):

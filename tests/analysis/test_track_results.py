@@ -112,7 +112,7 @@ def test_an_interrupted_curve_keeps_what_it_has(limit_point):
         ({"parameter": ("F", "c")}, "two ranges"),
         ({"parameter": ("F", "c"), "bounds": ((0.0, 1.0), (0.0, 1.0)), "omega": (1.0, 2.0)}, "leave omega= out"),
         ({"bounds": (0.2, 0.3)}, "the bifurcation has F=0.1, outside"),
-        ({"bounds": 3.0}, "bounds must be a list, not 3"),
+        ({"bounds": 3.0}, r"bounds must be two numbers \(from, to\) or a list of pairs"),
         ({"bounds": (0.1, 0.1)}, "two different finite ends"),
         ({"omega": (3.0, 4.0)}, "the bifurcation has omega="),
         ({"omega": (-1.0, 4.0)}, "frequencies are positive"),

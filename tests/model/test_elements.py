@@ -17,6 +17,7 @@ from suboctave.model import (
     PiecewiseLinear,
     PolynomialSpring,
     SharpSampling,
+    System,
     check_derivatives,
 )
 
@@ -222,10 +223,10 @@ def test_strided_input_gives_the_same_force():
         (lambda: CubicSpring(0, 1.0, direction=[1.0]), "not both"),
         (lambda: CubicSpring(-1, 1.0), "dof -1 is negative"),
         (lambda: CubicSpring((1, 1), 1.0), "couples a degree of freedom with itself"),
-        (lambda: CubicSpring((0, 1, 2), 1.0), "an integer or a pair"),
-        (lambda: CubicSpring(0.5, 1.0), "an integer or a pair"),
-        (lambda: CubicSpring("tip", 1.0), "an integer or a pair"),
-        (lambda: CubicSpring(True, 1.0), "an integer or a pair"),
+        (lambda: CubicSpring((0, 1, 2), 1.0), "an integer, a name, or a pair"),
+        (lambda: CubicSpring(0.5, 1.0), "an integer, a name, or a pair"),
+        (lambda: System(1.0, 0.1, 1.0, [CubicSpring("tip", 1.0)]), "none of the degrees of freedom"),
+        (lambda: CubicSpring(True, 1.0), "an integer, a name, or a pair"),
         (lambda: CubicSpring(coefficient=1.0, direction=[0.0, 0.0]), "not all zero"),
         (lambda: CubicSpring(0, "2*"), "CubicSpring\\(dof=0\\), coefficient: cannot read"),
         (lambda: CubicSpring(0, float("nan")), "must be finite"),

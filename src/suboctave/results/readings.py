@@ -55,7 +55,7 @@ if TYPE_CHECKING:
 
 
 #: what read-offs are asked for by: names, functions of a motion, True for all, False for none
-Readings: TypeAlias = str | Callable[[PeriodicOrbit], float] | Iterable[str | Callable[[PeriodicOrbit], float]] | bool
+Readings: TypeAlias = str | Callable[[PeriodicOrbit], float] | Sequence[str | Callable[[PeriodicOrbit], float]] | bool
 
 
 def _of_a_dof(what: str, meaning: str) -> Callable[..., Array]:
