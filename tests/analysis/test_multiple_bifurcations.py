@@ -307,7 +307,7 @@ def test_hopf_points_whose_cycles_cannot_be_told_apart():
     # of four oscillators neighbours do not meet in the third power of the amplitude: any phase between them will do
     branch = so.equilibria(van_der_pol(4), "mu", (-0.05, 0.15))
     event = next(event for event in branch.bifurcations if event.multiplicity == 2)
-    with pytest.raises(ConvergenceError, match="2 Hopf points fall together"):
+    with pytest.raises(ConvergenceError, match="2 Hopf points coincide"):
         so.limit_cycles(event, harmonics=5)
 
 
