@@ -118,7 +118,7 @@ def test_a_bifurcation_point_stays_undecided_and_says_why(doubling):
     assert not found.decided
     assert "-1.0000" in found.note
     assert "the circle" in found.note
-    assert "More harmonics than the motion's 31 would settle it" in found.note
+    assert "Use more harmonics than the motion's 31" in found.note
     assert [w.method for w in found.witnesses] == ["monodromy", "Hill"]
 
 
