@@ -125,7 +125,7 @@ def test_the_suffix_says_the_form(duffing, tmp_path, suffix, magic):
 def test_an_unknown_suffix_and_a_wrong_object_are_refused(duffing, tmp_path):
     with pytest.raises(InputError, match=r"did you mean '\.png'"):
         plot_response(duffing(), tmp_path / "curve.pgn")
-    with pytest.raises(InputError, match="to_xarray"):
+    with pytest.raises(InputError, match="draws branches, diagrams, isolas and their datasets, not object"):
         plot_response(object())
     with pytest.raises(InputError, match="no curve"):
         plot_response([])

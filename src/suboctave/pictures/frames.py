@@ -42,7 +42,7 @@ def framed(drawing: Drawing, options: Mapping[str, Any]) -> Drawing:
         if wanted.limits is None and (across.limits or upwards.limits or wanted.scale is not None):
             axes[number] = _around(frames, axes, number)
     if across.limits or upwards.limits:
-        frames = [_cut(frame, axes) for frame in frames]
+        frames = [cut(frame, axes) for frame in frames]
     for number, wanted in enumerate((across, upwards)):
         if wanted.label:
             axes[number] = replace(axes[number], label=wanted.label)
@@ -188,7 +188,7 @@ def _around(frames: Sequence[Frame], axes: Sequence[Axis], number: int) -> Axis:
     return replace(axis, low=low, high=high)
 
 
-def _cut(frame: Frame, axes: Sequence[Axis]) -> Frame:
+def cut(frame: Frame, axes: Sequence[Axis]) -> Frame:
     """The frame without markers and texts beyond its limits, and without what its legend would say of these alone."""
 
     def inside(at: np.ndarray) -> np.ndarray:

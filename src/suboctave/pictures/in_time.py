@@ -17,6 +17,7 @@ from suboctave.errors import GivenDof, InputError, chosen_dof, suggest
 from suboctave.pictures import style
 from suboctave.pictures.boundary import boundary_drawing
 from suboctave.pictures.drawing import STROKES, Axis, Band, Entry, Frame, Guide, Markers, Polyline, Raster, dot, plain
+from suboctave.pictures.frames import cut
 from suboctave.pictures.given import datasets_of, is_boundary
 from suboctave.pictures.options import (
     Coordinates,
@@ -112,7 +113,7 @@ def plot_brute_force(
     varied = str(diagram.attrs["varied"])
     values = diagram["value"].to_numpy()
     low, high = _limits(values)
-    frame = _beneath(curves, varied, View())
+    frame = _beneath(curves, Axis(varied, low, high), View())
     # beside curves, whose periods have the same names, marks say that they are motions in time
     suffix = "" if curves is None else ", in time"
     for start in shown:
@@ -150,7 +151,7 @@ def plot_stepped_sine(
     values = _component(test, harmonic, dof)
     omega, periods = test["omega"].to_numpy(), test["period"].to_numpy()
     low, high = _limits(np.concatenate([omega, *(one.omega for one in listed)]))
-    frame = _beneath(curves, "omega", View("harmonic", harmonic, None, dof))
+    frame = _beneath(curves, Axis("omega", low, high), View("harmonic", harmonic, None, dof))
     for s, direction in enumerate(test["direction"].to_numpy()):
         for period in sorted({int(p) for p in periods[s] if p >= 0}, key=lambda p: (p == 0, p)):
             here = periods[s] == period
@@ -174,9 +175,11 @@ def _limits(values: np.ndarray) -> tuple[float, float]:
     return float(values.min() - margin), float(values.max() + margin)
 
 
-def _beneath(curves: Any, x: str, view: View) -> Frame:
-    """The frame with branches over `x`, if any are given."""
-    return Frame() if curves is None else response_frame(datasets_of(curves, view), Coordinates((x, None), view))
+def _beneath(curves: Any, across: Axis, view: View) -> Frame:
+    """The frame with branches over a parameter, the text of an axis, if any are given; no markers beyond its ends."""
+    if curves is None:
+        return Frame()
+    return cut(response_frame(datasets_of(curves, view), Coordinates((across.label, None), view)), [across])
 
 
 def _add_motions(frame: Frame, row: xarray.Dataset, start: str, dof: int, sections: bool, suffix: str) -> None:
