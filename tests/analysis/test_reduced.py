@@ -35,5 +35,5 @@ def test_too_many_unknowns_are_refused_with_what_can_be_done():
     many = 300
     stiffness = 2.0 * np.eye(many) - np.eye(many, k=1) - np.eye(many, k=-1)
     system = so.System(np.eye(many), 0.01 * stiffness, stiffness, [], [so.HarmonicLoad(0, 1.0)])
-    with pytest.raises(so.InputError, match=r"keep fewer harmonics, or reduce the model .* direction=P\[dof\]"):
+    with pytest.raises(so.InputError, match=r"Keep fewer harmonics, or reduce the model .* direction=P\[dof\]"):
         so.frequency_response(system, (0.5, 0.6), harmonics=15, linear=StructuralMatrices(system))

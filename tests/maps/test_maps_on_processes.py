@@ -43,7 +43,7 @@ def test_a_time_limit_reaches_the_search_on_processes():
 
 
 def test_wrong_numbers_of_processes_are_refused():
-    with pytest.raises(so.InputError, match="workers=0"):
+    with pytest.raises(so.InputError, match="workers must be a positive whole number, not 0"):
         so.find_isolas(SYSTEM, **SEARCH, workers=0)
 
 

@@ -57,7 +57,9 @@ def test_a_third_of_the_frequency_is_drawn_and_motions_without_it_lie_at_zero(lo
 
 def test_read_offs_are_named_by_numbers_that_give_the_fraction_back(tripled):
     name = "harmonic_0.3333333333333333"
-    column = tripled.to_dataframe(readings=["harmonic_1/3"])[name]
+    column = tripled.to_xarray(readings=["harmonic_1/3"])[name]
+    # in a table, as it was asked for
+    np.testing.assert_array_equal(tripled.to_dataframe(readings=["harmonic_1/3"])["harmonic_1/3"], column)
     np.testing.assert_allclose(column, np.abs(tripled.harmonic(1 / 3)), rtol=1e-15)
     assert tripled.reading(name).tolist() == tripled.reading("harmonic_1/3").tolist()
 
