@@ -73,7 +73,9 @@ def test_a_bifurcation_that_more_harmonics_lead_away_from_keeps_its_place(monkey
     curve = so.frequency_response(gear(), (0.6, 0.53))
     doublings = [b.omega for b in curve.bifurcations["PD"]]
     np.testing.assert_allclose(doublings, [0.547233, 0.541815], atol=2e-6)
-    assert any("not found again with more (79: it leads to another one, at omega = 0.5472" in note for note in curve.warnings)
+    assert any(
+        "not found again with more (79: it leads to another one, at omega = 0.5472" in note for note in curve.warnings
+    )
 
 
 def test_a_fold_behind_the_grazing_of_a_text_is_laid_at_its_door():
