@@ -238,7 +238,7 @@ class Cache(FunctionCache):
         """What has been compiled for these types; None where there is nothing that this process can use."""
         try:
             return super().load_overload(signature, target)
-        except Exception:
+        except Exception:  # code of another processor or compiler: rebuilding it may raise anything
             return None
 
     def save_overload(self, signature: Any, data: Any) -> None:

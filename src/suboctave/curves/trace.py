@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from copy import copy
 from dataclasses import dataclass, field, replace
-from typing import Any, Self
+from typing import Any, TypeVar
 
 from suboctave.arguments import checked
 from suboctave.bifurcation.bifurcation import Bifurcation
@@ -41,12 +40,6 @@ class BranchPoint(Motion):
     method: StabilityMethod | None = None
     still: bool = field(default=False, kw_only=True)
     curve: Any = field(default=None, kw_only=True)
-
-    def on(self, curve: Any) -> Self:
-        """The same as a point of a curve."""
-        point = copy(self)
-        object.__setattr__(point, "curve", curve)
-        return point
 
     @property
     def omega(self) -> float:
@@ -104,6 +97,16 @@ class TrackedPoint(BranchPoint):
     coefficient: float = float("nan")
     extreme: str = ""
     isola: str = ""
+
+
+Bound = TypeVar("Bound", bound=BranchPoint)
+
+
+def bound(point: Bound, curve: Any) -> Bound:
+    """The same as a point of a curve; every point of every curve passes here."""
+    copied: Bound = object.__new__(type(point))
+    copied.__dict__.update(point.__dict__, curve=curve)
+    return copied
 
 
 #: scaled arclength up to which two stretches in doubt are at one place of the branch: a share of a usual step

@@ -511,7 +511,8 @@ def parts_of_dof(dataset: xarray.Dataset, dof: int) -> tuple[str, str]:
     if of_node := re.fullmatch(r"(\w+) ([xyz])", names[dof]):
         return of_node[2], f"_{{{of_node[1]}}}"
     name = re.sub(r"[\W_]+", "", names[dof])
-    word, digits = re.fullmatch(r"(.*?)(\d*)", name).groups()  # type: ignore[union-attr]
+    digits = name[len(name.rstrip("0123456789")) :]
+    word = name.removesuffix(digits)
     word = _GREEK.get(word, word)
     if len(word) != 1:
         return "x", f"_{{{name}}}"

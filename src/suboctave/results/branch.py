@@ -17,7 +17,7 @@ from suboctave.bifurcation.bifurcation import Bifurcation, BifurcationList, targ
 from suboctave.continuation.ending import Ending, interruption_of, sentence
 from suboctave.continuation.problem import Array
 from suboctave.curves.junction import Junction, period_name
-from suboctave.curves.trace import Audit, BranchPoint, TrackedPoint
+from suboctave.curves.trace import Audit, BranchPoint, TrackedPoint, bound
 from suboctave.errors import GivenDof, InputError, suggest
 from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.orbit import PeriodicOrbit
@@ -150,7 +150,7 @@ class Branch(CurveTables, BranchReadings):
     ) -> None:
         self.system = system
         self.name = name
-        self.points = tuple(point.on(self) for point in points)
+        self.points = tuple([bound(point, self) for point in points])
         self.bifurcations = BifurcationList(bifurcations)
         self.events = BifurcationList(events, tuple({e.kind for e in events}))
         self.closed = closed
@@ -197,7 +197,7 @@ class Branch(CurveTables, BranchReadings):
 
     def bound(self, point: BranchPoint) -> BranchPoint:
         """A motion on the curve as one of its points."""
-        return point.on(self)
+        return bound(point, self)
 
     def at(self, **place: float) -> Points:
         """All points at a value of a parameter that the curve was followed in, such as `curve.at(omega=1.5)`.

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 #: share of a peak at its half-power points
 _HALF = math.sqrt(0.5)
-#: shares of the largest component from which on harmonics are named
+#: relative difference of two values of a quantity that is none: a curve along which it stands has no peak
 _EVEN = 1e-9
 
 
