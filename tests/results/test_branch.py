@@ -156,3 +156,6 @@ def test_notes_of_one_cause_are_one_line():
         "5 LP between omega = 1 and 5: in doubt. Use more",
         "between omega = 2 and 2.0000001: constant",
     ]
+    lost = [Note("lost", "j", j, j, "LP", f"omega = 1, j = {j:g}", f"diverged at {j:g}") for j in (0.1, 0.2, 0.3, 0.4)]
+    assert lines(lost[:1]) == ["LP at omega = 1, j = 0.1: lost: diverged at 0.1"]
+    assert lines(lost) == ["4 LP between j = 0.1 and 0.4: lost, the first: diverged at 0.1"]

@@ -1,4 +1,4 @@
-"""What a curve leaves open, in lines: notes of one cause become one line, however many places they are of."""
+"""What a curve or a search leaves open, in lines: notes of one cause become one line, however many their places are."""
 
 from __future__ import annotations
 
@@ -27,6 +27,8 @@ class Note:
         Of the bifurcation that it is about; empty for a stretch of the curve.
     where
         The place in words, where it has more than one parameter.
+    failure
+        The message of the failure that is the reason; of several places that of the first is given.
     """
 
     text: str
@@ -35,6 +37,7 @@ class Note:
     last: float = 0.0
     kind: str = ""
     where: str = ""
+    failure: str = ""
 
     @property
     def cause(self) -> str:
@@ -53,8 +56,9 @@ def lines(notes: Iterable[Note]) -> list[str]:
 def _line(cause: str, notes: Sequence[Note]) -> str:
     head = notes[0]
     text = head.text if all(note.text == head.text for note in notes) else cause
-    place = ", ".join(map(_one, notes)) if len(notes) <= _LISTED else _several(notes)
-    return f"{place}: {text}" if place else text
+    place = ("; " if head.where else ", ").join(map(_one, notes)) if len(notes) <= _LISTED else _several(notes)
+    one = all(note.failure == head.failure for note in notes)
+    return ": ".join(part for part in (place, text + (", the first" if not one else ""), head.failure) if part)
 
 
 def _one(note: Note) -> str:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -23,6 +23,7 @@ from suboctave.analysis.track import track
 from suboctave.arguments import checked
 from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.continuation import NewtonOptions
+from suboctave.continuation.notes import Note, lines
 from suboctave.curves.identity import Relation, gap_to, lies_on, relation
 from suboctave.curves.junction import period_name
 from suboctave.curves.sample import Sample
@@ -54,6 +55,8 @@ _BESIDE = 1e-3
 _CLEAR = 1e-4
 #: errors of verbs that start from a bifurcation
 FAILURES = (ConvergenceError, InputError)
+#: what is noted of limit points through which no branch was found
+THROUGH = "the branch through it could not be followed"
 
 
 class SearchRange(NamedTuple):
@@ -101,7 +104,7 @@ _KEPT = "what is here is what had been found by then"
 class Work:
     """What is said of long work: what it could not settle, how far it has come, what stopped it before its end."""
 
-    notes: list[str] = field(default_factory=list)
+    notes: list[Note] = field(default_factory=list)
     report: Callable[[float, str], None] | None = None
     interruption: Interruption | None = None
 
@@ -113,25 +116,20 @@ class Work:
                 yield
             except KeyboardInterrupt as cause:
                 self.interruption = Interruption.of(cause)
-                self.note(f"{self.interruption}: {kept}")
+                self.notes.append(Note(f"{self.interruption}: {kept}"))
 
-    def note(self, text: str) -> None:
-        """Something that could not be settled, listed once."""
-        if text not in self.notes:
-            self.notes.append(text)
-
-    def take(self, notes: Iterable[str]) -> None:
-        """Note what others could not settle."""
-        for text in notes:
-            self.note(text)
+    @property
+    def unsettled(self) -> tuple[str, ...]:
+        """What could not be settled, one line for each cause."""
+        return tuple(lines(self.notes))
 
     @contextmanager
-    def noting(self, what: str, errors: tuple[type[Exception], ...] = (ConvergenceError,)) -> Iterator[None]:
+    def noting(self, what: Note, errors: tuple[type[Exception], ...] = (ConvergenceError,)) -> Iterator[None]:
         """Note what could not be computed within, and why."""
         try:
             yield
         except errors as failure:
-            self.note(f"{what}: {failure}")
+            self.notes.append(replace(what, failure=str(failure)))
 
     def progress(self, share: float, where: str) -> None:
         """Report how far the work has come."""
@@ -205,12 +203,18 @@ class Catalogue(Work):
         """The system at a value of the parameter."""
         return self.system.with_parameters({self.name: value})
 
+    def open(self, text: str, value: float, omega: float | None = None, kind: str = "") -> Note:
+        """Something that is open at a value of the parameter, and at a frequency."""
+        where = f"{self.name} = {value:.6g}"
+        where = where if omega is None else f"omega = {omega:.6g}, {where}"
+        return Note(text, self.name, value, value, kind, where)
+
     # ------------------------------------------------------------------------------------------------------ branches
     def responses(self, value: float, omega: tuple[float, float], followed: Followed) -> Iterator[BifurcationDiagram]:
         """The response at a value with what bifurcates from it; that from the other end as well if it is another."""
         low, high = omega
         for ends in ((high, low), (low, high)):
-            with self.noting(f"at {self.name} = {value:.6g}"):
+            with self.noting(self.open("the response could not be followed", value)):
                 diagram = diagram_of(self.at(value), ends, self.harmonics, followed, self.options)
                 self.note_failures(diagram, value)
                 yield diagram
@@ -225,28 +229,28 @@ class Catalogue(Work):
 
         `share` of the work, for progress.
         """
-        where = f"searching {period_name(order)} motions at {self.name} = {value:.6g}"
-        self.progress(share, where)
-        try:
+        what, found = f"{period_name(order)} motions", list[Branch]()
+        self.progress(share, f"searching {what} at {self.name} = {value:.6g}")
+        with self.noting(self.open(f"the search for {what} failed", value)):
             at = self.at(value), self.omega, order, known, self.harmonics
-            return isolated_branches(*at, seeds=seeds or _COARSE, **self.options)
-        except ConvergenceError as failure:
-            self.note(f"{where}: {failure}")
-            return []
+            found += isolated_branches(*at, seeds=seeds or _COARSE, **self.options)
+        return found
 
     def note_failures(self, diagram: BifurcationDiagram, value: float) -> None:
         """Note the branches of a diagram that could not be followed, and stop where it was interrupted."""
         pass_on(diagram.interruption)
         for node in diagram:
             for item, why in node.failures:
-                self.note(f"at {self.name} = {value:.6g}, {item.kind} at omega = {item.omega:.6g}: {why}")
+                place = self.open("what leaves it could not be followed", value, item.omega, item.kind)
+                self.notes.append(replace(place, failure=why))
 
     def carrier(self, branch: Branch, value: float, attached: Iterable[Branch]) -> Branch | None:
         """As `carrier_of`; None, with a note, where that cannot be decided."""
         try:
             return carrier_of(branch, attached, self.options)
         except FAILURES as failure:
-            self.note(f"whether a closed branch at {self.name} = {value:.6g} is isolated is open: {failure}")
+            place = self.open("whether a closed branch is isolated is open", value)
+            self.notes.append(replace(place, failure=str(failure)))
             return None
 
     # -------------------------------------------------------------------------------------------------------- curves
@@ -279,18 +283,24 @@ class Catalogue(Work):
         lost = (b for v, b in self._lost if v == value and b.kind == item.kind)
         if piece is not None or any(abs(b.omega - item.omega) <= _SAME_OMEGA * item.omega for b in lost):
             return piece
-        where = f"{item.kind} at omega = {item.omega:.6g}, {self.name} = {value:.6g}"
+
+        def noted(text: str) -> Note:
+            return self.open(text, value, item.omega, item.kind)
+
         if len(self.curves) >= self.most:
-            self.note(f"max_curves={self.most} curves were followed: the {where} and what lies beyond it were not")
+            text = f"max_curves={self.most} curves were followed, this one and what lies beyond it were not. Raise it"
+            self.notes.append(noted(text))
             return None
-        self.progress(-1.0, where)
-        with self.noting(f"the {where} could not be followed over {self.name}", FAILURES):
+        self.progress(-1.0, f"{item.kind} at omega = {item.omega:.6g}, {self.name} = {value:.6g}")
+        with self.noting(noted(f"could not be followed over {self.name}"), FAILURES):
             curve = track(item, self.name, self.bounds, omega=self.omega.around, **self.options)
             pass_on(curve.interruption)
             self.add(curve)
             piece = self.piece_of(item, value)
             if piece is None:
-                self.note(f"the {where} is not on its curve")
+                self.notes.append(
+                    noted("not on the curve that was followed from it. Use a smaller max_step or more harmonics")
+                )
         if piece is None:
             self._lost.append((value, item))
         return piece
@@ -310,14 +320,14 @@ class AtValues(ABC):
     def found(self, catalogue: Catalogue, place: Any) -> list[Any]:
         """What there is at a place; what cannot be settled is noted in the catalogue."""
 
-    def __call__(self, place: Any) -> tuple[list[Any], list[str]]:
+    def __call__(self, place: Any) -> tuple[list[Any], list[Note]]:
         own = self.catalogue.emptied()
         return self.found(own, place), own.notes
 
     def over(self, places: Sequence[Any], workers: int, noted: Catalogue) -> Iterator[list[Any]]:
         """What there is at each place, in order; what could not be settled is noted in `noted`."""
         for found, notes in in_order(self, places, workers):
-            noted.take(notes)
+            noted.notes += notes
             yield found
 
 

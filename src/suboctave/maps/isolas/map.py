@@ -25,6 +25,7 @@ from suboctave.analysis.options import SearchOptions
 from suboctave.analysis.track import track
 from suboctave.arguments import Positive, Range, checked
 from suboctave.bifurcation.bifurcation import Bifurcation
+from suboctave.continuation.notes import Note, lines
 from suboctave.continuation.problem import Array
 from suboctave.curves.identity import lies_on
 from suboctave.curves.junction import period_name
@@ -113,7 +114,9 @@ def isola_map(
             regions.progress(number / len(items), f"isola {number + 1} of {len(items)}")
             regions.follow(isola, places)
     within = isolas.bounds if isinstance(isolas, Isolas) else None
-    return IsolaMap(regions.regions, system, name, parameter, within, (low, high), regions.notes, regions.interruption)
+    return IsolaMap(
+        regions.regions, system, name, parameter, within, (low, high), regions.unsettled, regions.interruption
+    )
 
 
 def _checked(isolas: Any) -> list[Isola]:
@@ -149,19 +152,18 @@ class _Regions(Work):
         for end, value, reason in zip(isola.ends, isola.range, isola.reasons, strict=True):
             if end is None:
                 ends.append(value)
-                self.notes.append(
-                    f"one end of the isola is no extremum at {second} = {here:g} ({reason}): the map keeps "
-                    f"{name} = {value:.7g} there"
-                )
+                text = f"one end of the isola is no extremum ({reason}). The map keeps {name} = {value:.7g} there"
+                self.notes.append(Note(text, second, here, here))
                 continue
+            place = name, float(end), float(end), end.kind.replace("_", " ")
             try:
                 curve = self._curve(end)
             except ConvergenceError as failure:
-                self.notes.append(f"the {end.kind.replace('_', ' ')} could not be followed over {second}: {failure}")
+                self.notes.append(Note(f"could not be followed over {second}", *place, failure=str(failure)))
                 return
             borders = [b for b in pieces_of(curve, second, name) if b.contains(here)]
             if not borders:
-                self.notes.append(f"the curve of {end!r} does not pass {second} = {here:g}")
+                self.notes.append(Note(f"its curve does not pass {second} = {here:g}", *place))
                 return
             ends.append(min(borders, key=lambda b: abs(float(b.across(here)) - float(end))))
             if curve not in curves:
@@ -171,7 +173,7 @@ class _Regions(Work):
         sides = (_reached(here, both, self.bounds, second, upper) for upper in (False, True))
         (low, high), reasons, closed, settled = zip(*sides, strict=True)
         span = Span(low, high, both, reasons, closed, settled)
-        self.notes += [reason for reason, settled in zip(span.reasons, span.settled, strict=True) if not settled]
+        self.notes += [Note(reason) for reason, settled in zip(span.reasons, span.settled, strict=True) if not settled]
         looks = tuple(self._probes(isola, span, probes))
         self.regions.append(IsolaRegion(isola, second, span, tuple(curves), looks))
 
@@ -393,12 +395,17 @@ class IsolaMap(PlaneMap):
     def __post_init__(self) -> None:
         self.regions = tuple(self.regions)
         doubts = [
-            f"at {self.second} = {probe.second:.6g}, {self.parameter} = {probe.middle:.6g}: {probe.disagreement}"
+            Note(
+                "a closed branch that was followed here disagrees with the map",
+                *(self.second, probe.second, probe.second),
+                where=f"{self.second} = {probe.second:.6g}, {self.parameter} = {probe.middle:.6g}",
+                failure=probe.disagreement,
+            )
             for region in self.regions
             for probe in region.probes
             if not probe.agrees
         ]
-        self.notes = tuple(dict.fromkeys([*self.notes, *doubts]))
+        self.notes = tuple(dict.fromkeys([*self.notes, *lines(doubts)]))
 
     @property
     def born(self) -> list[TrackedBranch]:

@@ -27,6 +27,8 @@ from suboctave.results.branch import Branch
 _IMAGES = 12
 #: name of the parameter that scales all loads
 _LEVEL = "load_level"
+#: what is noted of limit points that responses under other loads lead to
+FROM_LOADS = "found under other loads, could not be reached at the loads' own level"
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,12 +105,14 @@ class UnderOtherLoads(AtValues):
                 for item in branch.bifurcations["LP"]:
                     other.known(item, level)
         finally:
+            # at this value of the parameter, whatever the level of the loads
             for note in other.notes:
-                catalogue.note(f"at {catalogue.name} = {value:.6g}, looking at {level:g} times the loads: {note}")
+                place = ", ".join(filter(None, (note.where, f"{catalogue.name} = {value:.6g}")))
+                catalogue.notes.append(replace(note, parameter=catalogue.name, first=value, last=value, where=place))
         orbits = []
         for piece in other.limit_points:
             if piece.contains(1.0):
-                with catalogue.noting(f"at {catalogue.name} = {value:.6g}, a limit point from stronger loads"):
+                with catalogue.noting(catalogue.open(FROM_LOADS, value, kind="LP")):
                     orbits.append(_unscaled(piece.solve_at(1.0).orbit, system))
         return orbits
 

@@ -20,7 +20,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,7 +32,7 @@ from suboctave.curves.junction import period_name
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.interruption import pass_on
-from suboctave.maps.catalogue import Catalogue, branch_through
+from suboctave.maps.catalogue import THROUGH, Catalogue, branch_through
 from suboctave.maps.isolas.result import Isola, IsolaEnd, Isolas
 from suboctave.maps.pieces import MonotonePiece
 from suboctave.results.branch import Branch
@@ -190,7 +190,7 @@ class Search:
         limit_points, doublings = ([c for c in catalogue.curves if c.kind == kind] for kind in ("LP", "PD"))
         where = f"for {catalogue.name} from {low:g} to {high:g}, omega from {first:g} to {last:g}"
         looked = _listed(stage.so_far for stage in self.stages if stage.leads and stage.done) or "nothing"
-        followed = f"{len(limit_points)} curves of limit points from {looked}"
+        followed = f"{len(limit_points)} curve{'s' * (len(limit_points) != 1)} of limit points from {looked}"
         count = f"{len(isolas) or 'no'} isola{'s' * (len(isolas) != 1)}"
         if catalogue.interruption is not None:
             missing = _listed(stage.left for stage in self.stages if stage.done < stage.planned)
@@ -205,7 +205,7 @@ class Search:
             summary = f"No isola of {periods} motions was found {where}: {followed} have none."
         self._note_breaks()
         asked = catalogue.system, catalogue.name, catalogue.bounds, (first, last)
-        return Isolas(isolas, *asked, limit_points, doublings, catalogue.notes, summary, catalogue.interruption)
+        return Isolas(isolas, *asked, limit_points, doublings, catalogue.unsettled, summary, catalogue.interruption)
 
     def _note_breaks(self) -> None:
         """Note where curves of limit points could be followed no further, unless another one passes there."""
@@ -218,10 +218,12 @@ class Search:
                     continue
                 if any(c.nu == curve.nu and lies_on(orbit, c.points, name, True) for c in curves if c is not curve):
                     continue
-                self.catalogue.note(
-                    f"limit points of {period_name(curve.nu)} motions were followed up to omega = {orbit.omega:.6g}, "
-                    f"{name} = {orbit.values[name]:.6g} ({ending}): isolas beyond may be missing"
+                what = f"limit points of {period_name(curve.nu)} motions"
+                text = (
+                    f"{what} end here ({ending}), isolas beyond may be missing. "
+                    "Use a smaller max_step or more harmonics"
                 )
+                self.catalogue.notes.append(self.catalogue.open(text, orbit.values[name], orbit.omega))
 
     # ------------------------------------------------------------------------------------- branches at one value
     def through(self, piece: MonotonePiece, value: float, noted: bool = True) -> Loop | None:
@@ -232,9 +234,9 @@ class Search:
             item = piece.solve_at(value)
             branch = branch_through(item, catalogue.omega, catalogue.name, same, catalogue.options)
         except ConvergenceError as failure:
-            where = f"omega = {float(piece.across(value)):.6g}, {catalogue.name} = {value:.6g}"
             if noted:
-                catalogue.note(f"the branch at {where} could not be followed: {failure}")
+                place = catalogue.open(THROUGH, value, float(piece.across(value)), "LP")
+                catalogue.notes.append(replace(place, failure=str(failure)))
             return None
         pass_on(branch.interruption)
         return self.of(branch, value, piece)
@@ -281,11 +283,12 @@ class Search:
                     pass_on(branch.interruption)
         if branch.nu > 1 and not branch.closed and not branch.junctions:
             middle = branch.orbits[len(branch) // 2]
-            catalogue.note(
-                f"the {period_name(branch.nu)} branch at omega = {middle.omega:.6g}, {catalogue.name} = {value:.6g} "
-                f"may be an isola: it does not close between omega = {branch.omega.min():.6g} and "
-                f"{branch.omega.max():.6g} ({branch.ended}). Use a wider range of omega"
+            between = f"between omega = {branch.omega.min():.6g} and {branch.omega.max():.6g}"
+            text = (
+                f"this {period_name(branch.nu)} branch may be an isola, it does not close ({between}, {branch.ended}). "
+                "Use a wider range of omega"
             )
+            catalogue.notes.append(catalogue.open(text, value, middle.omega))
         return branch
 
     def pieces_on(self, branch: Branch, value: float, *known: MonotonePiece) -> tuple[MonotonePiece, ...]:

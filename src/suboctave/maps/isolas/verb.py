@@ -30,7 +30,7 @@ from suboctave.curves.junction import period_name
 from suboctave.curves.starts import Harmonics
 from suboctave.errors import InputError, is_number, refuse_idle
 from suboctave.maps.catalogue import Catalogue, checked_orders, checked_values, listed
-from suboctave.maps.isolas.responses import Responses, UnderOtherLoads, followed_doublings
+from suboctave.maps.isolas.responses import FROM_LOADS, Responses, UnderOtherLoads, followed_doublings
 from suboctave.maps.isolas.result import Isolas
 from suboctave.maps.isolas.search import PREPARATION, Loop, Search, Stage
 from suboctave.model.inputs import check_count, timed
@@ -194,7 +194,7 @@ def _from_load_levels(search: Search, levels: Sequence[float] | None, depth: int
             for orbit in orbits:
                 if any(lies_on(orbit, branch.points, images=True) for branch in known):
                     continue
-                with catalogue.noting(f"at {catalogue.name} = {value:.6g}, a limit point from stronger loads"):
+                with catalogue.noting(catalogue.open(FROM_LOADS, value, kind="LP")):
                     bounds = (min(catalogue.omega.low, orbit.omega), max(catalogue.omega.high, orbit.omega))
                     known.append(continue_branch(orbit, "omega", bounds, **catalogue.options))
                     search.meet(known[-1], value)

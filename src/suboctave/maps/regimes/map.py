@@ -88,7 +88,7 @@ class RegimeMap(PlaneMap):
         self.strips = tuple(strips)
         self.depth = depth
         self.resolution = resolution
-        self.notes = tuple(catalogue.notes)
+        self.notes = catalogue.unsettled
         self.interruption = catalogue.interruption
 
     def strip(self, value: float) -> Strip:

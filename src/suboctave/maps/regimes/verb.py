@@ -27,6 +27,7 @@ from suboctave.analysis.options import DesignOptions
 from suboctave.analysis.subharmonics import Seeds
 from suboctave.arguments import Range
 from suboctave.bifurcation.bifurcation import Bifurcation, TrackedEvent
+from suboctave.continuation.notes import Note
 from suboctave.curves.identity import lies_on, mirrored
 from suboctave.curves.junction import period_name
 from suboctave.curves.starts import Harmonics
@@ -36,6 +37,7 @@ from suboctave.interruption import pass_on, unlimited
 from suboctave.maps.catalogue import (
     FAILURES,
     MOST_VALUES,
+    THROUGH,
     AtValues,
     Catalogue,
     SearchRange,
@@ -184,7 +186,9 @@ def _follow_motions(motions: Sequence[PeriodicOrbit], catalogue: Catalogue) -> N
         if any(v == value and lies_on(orbit, b.points) for v, b in known):
             continue
         catalogue.progress(0.0, f"{period_name(orbit.basis.nu)} at {catalogue.name} = {value:.6g}")
-        with catalogue.noting(f"the branch through {orbit!r} could not be followed"):
+        with catalogue.noting(
+            catalogue.open("the branch through a motion given could not be followed", value, orbit.omega)
+        ):
             branch = continue_branch(orbit, "omega", catalogue.omega.around, **catalogue.options)
             pass_on(branch.interruption)
             known.append((value, branch))
@@ -220,7 +224,7 @@ class _Foreseen:
 
     reach: SearchRange
     diagrams: Sequence[BifurcationDiagram]
-    notes: Sequence[str]
+    notes: Sequence[Note]
 
 
 def _foresee(catalogue: Catalogue, longest: int, place: tuple[float, SearchRange]) -> _Foreseen:
@@ -270,7 +274,7 @@ class _GrowingSlice(Slice):
             # the response from both ends with all that bifurcates from it
             if foreseen is None or foreseen.reach != reach:
                 foreseen = _foresee(self.catalogue, self.longest, (self.value, reach))
-            self.catalogue.take(foreseen.notes)
+            self.catalogue.notes += foreseen.notes
             for diagram in foreseen.diagrams:
                 known = [branch for branch, _ in self.branches]
                 for branch in diagram.branches:
@@ -305,8 +309,7 @@ class _GrowingSlice(Slice):
         """The branch through a limit point, its mirror image if that is another one, and what bifurcates from them."""
         catalogue, value, options = self.catalogue, self.value, self.catalogue.options
         met: list[Branch] = []
-        where = f"omega = {float(piece.across(value)):.6g}, {catalogue.name} = {value:.6g}"
-        with catalogue.noting(f"the branch through the limit point at {where} could not be followed", FAILURES):
+        with catalogue.noting(catalogue.open(THROUGH, value, float(piece.across(value)), "LP"), FAILURES):
             met = self._both_images(piece)
         for one in met:
             if self._is_known(one):
@@ -348,10 +351,11 @@ class _GrowingSlice(Slice):
         for branch, isolated in self.branches:
             for stretch in stretches(branch, located):
                 if stretch.stable is None and stretch.width > _NARROW * (high - low):
-                    self.catalogue.note(
-                        f"at {self.catalogue.name} = {self.value:.6g} a {period_name(branch.nu)} branch has no points "
-                        f"over {stretch.width:.2g} of omega, which count as unstable. Use a smaller max_step"
+                    text = (
+                        f"a {period_name(branch.nu)} branch has no points on a stretch of omega "
+                        f"({stretch.width:.2g} wide), which counts as unstable. Use a smaller max_step"
                     )
+                    self.catalogue.notes.append(self.catalogue.open(text, self.value))
                 beyond = 2 * branch.nu > self.longest and stretch.doubled
                 if stretch.stable or beyond:
                     self._add_arc(self._arc(stretch, isolated, beyond))
@@ -375,10 +379,8 @@ class _GrowingSlice(Slice):
                 continue
             bound = end <= low + slack or end >= high - slack
             if not bound:
-                catalogue.note(
-                    f"at {catalogue.name} = {self.value:.6g} a branch of stable motions ends at omega = {end:.6g}: "
-                    f"{stretch.branch.ended}"
-                )
+                text = f"a branch of stable motions ends here ({stretch.branch.ended})"
+                catalogue.notes.append(catalogue.open(text, self.value, end))
             outside = -float("inf") if end <= low + slack else float("inf")
             edges.append(Edge(outside if bound else end, bound=bound))
         first, last = sorted(edges, key=lambda edge: edge.omega)
@@ -400,10 +402,8 @@ def _follow_curves_of(branch: Branch, value: float, catalogue: Catalogue) -> Non
     before = len(catalogue.pieces)
     known = [catalogue.known(item, value) for item in branch.bifurcations["LP"]]
     if not any(known) and before == len(catalogue.pieces):
-        catalogue.note(
-            f"a {period_name(branch.nu)} branch at {catalogue.name} = {value:.6g} is not on the map: none of its limit "
-            "points could be followed"
-        )
+        text = f"a {period_name(branch.nu)} branch is not on the map: none of its limit points could be followed"
+        catalogue.notes.append(catalogue.open(text, value))
 
 
 def _follow_curves_beside(value: float, catalogue: Catalogue) -> None:
@@ -413,7 +413,7 @@ def _follow_curves_beside(value: float, catalogue: Catalogue) -> None:
     """
     low, high = catalogue.omega
     around = catalogue.omega.around
-    with catalogue.noting(f"at {catalogue.name} = {value:.6g} the response beside the range of omega was not found"):
+    with catalogue.noting(catalogue.open("the response beside the range of omega was not found", value)):
         wide = frequency_response(catalogue.at(value), around[::-1], harmonics=catalogue.harmonics, **catalogue.options)
         pass_on(wide.interruption)
         folds: list[Bifurcation] = wide.bifurcations["LP"]
@@ -450,9 +450,10 @@ class _Survey:
             foreseen = self._foreseen(waiting)
             for number, value in enumerate(waiting):
                 if len(self.slices) >= self.most:
-                    catalogue.note(
-                        f"narrow strips may be missing after {self.most} values of {catalogue.name}: raise max_slices"
+                    text = (
+                        f"narrow strips may be missing after {self.most} values of {catalogue.name}. Raise max_slices"
                     )
+                    catalogue.notes.append(Note(text))
                     return
                 share = len(self.slices) / (len(self.slices) + len(waiting) - number + 3.0)
                 catalogue.progress(share, f"{catalogue.name} = {value:.6g}")
