@@ -66,13 +66,49 @@ def test_each_process_computes_on_one_thread():
     assert found == ["1"] * len(names)
 
 
-def test_nobody_computes_on_when_the_reader_has_enough():
-    pids = []
-    for _, pid in workers.completed(lambda value: (time.sleep(0.01 * value), os.getpid())[1], [0, 0, 0, 4000], 2):
-        pids.append(pid)
-        if len(pids) == 3:
+def test_nobody_computes_on_when_the_reader_has_enough(tmp_path):
+    late = tmp_path / "late"
+
+    def work(value):
+        if value:
+            time.sleep(value)
+            late.touch()
+
+    for count, _ in enumerate(workers.completed(work, [0, 0, 0, 0.5], 2), 1):
+        if count == 3:
             break
-    assert_gone(pids)
+    time.sleep(0.7)
+    assert not late.exists()
+
+
+def processes_of(work=lambda _: os.getpid(), **environment):
+    """The processes that compute two tasks."""
+    with pytest.MonkeyPatch.context() as patch:
+        for name, value in environment.items():
+            patch.setenv(name, value)
+        return {pid for _, pid in workers.completed(work, [0, 1], 1)}
+
+
+def test_processes_wait_for_the_next_call(tmp_path):
+    """But not those that differ from new ones: by their environment, by modules whose files may change."""
+    (first,) = processes_of()
+    assert processes_of() == {first}
+    (other,) = processes_of(ANYTHING="else")
+    assert other != first
+    assert_gone([first])
+    (tmp_path / "own_module.py").write_text("")
+
+    def imports(_):
+        sys.path.insert(0, str(tmp_path))
+        import own_module  # noqa: F401
+
+        return os.getpid()
+
+    (third,) = processes_of(imports)
+    assert_gone([third])
+    (fourth,) = processes_of()
+    workers._end_idle()
+    assert_gone([fourth])
 
 
 CODE = """

@@ -7,10 +7,14 @@ another one computes again; one that dies again and again is given up (`Lost`).
 The processes are interpreters of their own, which run this module. They import nothing of the script that started them:
 functions travel by value where they cannot be imported (cloudpickle), so that neither a `__main__` guard nor an
 installed module is asked for. Their standard input ends with the process that started them, and they end with it.
+
+A process that has come to the end of its tasks waits for those of the next call, for a minute: to begin one costs some
+seconds. It waits only if it has imported nothing but installed packages, since a user's own modules may change.
 """
 
 from __future__ import annotations
 
+import atexit
 import os
 import pickle
 import queue
@@ -33,6 +37,8 @@ from suboctave.version import __version__
 TRIES = 3
 #: seconds between looks at the clock and at Ctrl-C while tasks are computed
 _LOOK = 0.2
+#: seconds that a process waits for its next task
+_WAITS = 60.0
 #: seconds in which a cluster must answer
 _CONNECT = 20
 #: one thread for whatever computes in a task: BLAS in its versions, OpenMP, Numba
@@ -152,7 +158,10 @@ class _Seat(threading.Thread):
         super().__init__(daemon=True)
         self.payload, self.tasks, self.waiting, self.answers = payload, tasks, waiting, answers
         self._process: subprocess.Popen[bytes] | None = None
+        self._begun_in: _Surroundings = {}, "", None
         self._stopped = False
+        #: the process computes, or has imported what may change: the next call cannot have it
+        self._taken = False
         #: a process is not begun while all of them are ended
         self._changing = threading.Lock()
 
@@ -171,11 +180,14 @@ class _Seat(threading.Thread):
         self.stop()
 
     def stop(self) -> None:
-        """End the process, whatever it does."""
+        """End the process, whatever it does; one that has nothing to do waits for the next call."""
         with self._changing:
             self._stopped = True
             if self._process is not None:
-                self._end(self._process)
+                if self._taken:
+                    _end(self._process)
+                else:
+                    _idle.append((self._begun_in, self._process))
                 self._process = None
 
     def _computed(self, number: int) -> tuple[Any, BaseException | None]:
@@ -186,35 +198,36 @@ class _Seat(threading.Thread):
                 if self._stopped:
                     break
                 if self._process is None:
-                    self._process = _process(self.payload)
-                process = self._process
+                    self._begun_in = _surroundings()
+                    self._process = _process(self.payload, self._begun_in)
+                process, self._taken = self._process, True
             try:
-                _send(process.stdin, self.tasks[number])
-                block = _receive(process.stdout)
+                _send(process.stdin, _TASK, self.tasks[number])
+                _, block = _receive(process.stdout)
             except (OSError, EOFError, ValueError):  # it is no more, its pipes are closed
                 with self._changing:
                     if self._process is process:
-                        how = _words(self._end(process))
+                        how = _words(_end(process))
                         self._process = None
                 continue
             try:
-                answer: tuple[Any, BaseException | None] = pickle.loads(block)
-            except Exception as error:  # what only a worker can make
-                return None, error
-            return answer
+                result, error, self._taken = pickle.loads(block)
+            except Exception as failure:  # what only a worker can make
+                return None, failure
+            return result, error
         return Lost(f"its process {how}, {TRIES} times"), None
 
-    @staticmethod
-    def _end(process: subprocess.Popen[bytes]) -> int:
-        """End a process; its exit status."""
-        with suppress(OSError):
-            process.kill()
-        status = process.wait()
-        for stream in (process.stdin, process.stdout):
-            if stream is not None:
-                with suppress(OSError):
-                    stream.close()
-        return status
+
+def _end(process: subprocess.Popen[bytes]) -> int:
+    """End a process; its exit status."""
+    with suppress(OSError):
+        process.kill()
+    status = process.wait()
+    for stream in (process.stdin, process.stdout):
+        if stream is not None:
+            with suppress(OSError):
+                stream.close()
+    return status
 
 
 def _words(status: int) -> str:
@@ -229,70 +242,118 @@ def _words(status: int) -> str:
     return f"was ended by {name}{memory}"
 
 
-def _process(payload: bytes) -> subprocess.Popen[bytes]:
-    """A process that computes tasks: it finds modules where this one does."""
+#: environment, folder, and file that errors are printed to: what a process has from its beginning
+_Surroundings = tuple[dict[str, str], str, tuple[int, int] | None]
+#: processes that wait for tasks
+_idle: deque[tuple[_Surroundings, subprocess.Popen[bytes]]] = deque()
+
+
+def _surroundings() -> _Surroundings:
+    """What a process that is begun here and now has: it finds modules where this one does."""
     places = os.pathsep.join(os.path.abspath(place) for place in sys.path)
-    process = subprocess.Popen(
-        [sys.executable, "-m", "suboctave.workers"],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        env={**os.environ, **_ONE_THREAD, _CORES: "1", "PYTHONPATH": places, "PYTHONSAFEPATH": "1"},
-    )
+    environment = {**os.environ, **_ONE_THREAD, _CORES: "1", "PYTHONPATH": places, "PYTHONSAFEPATH": "1"}
+    errors = None
+    with suppress(OSError):
+        status = os.fstat(2)
+        errors = status.st_dev, status.st_ino
+    return environment, os.getcwd(), errors
+
+
+def _process(payload: bytes, surroundings: _Surroundings) -> subprocess.Popen[bytes]:
+    """A process that computes tasks: one that waits, or a new one."""
+    process = None
+    with suppress(IndexError):
+        while process is None:
+            known, waiting = _idle.pop()
+            if known == surroundings and waiting.poll() is None:
+                process = waiting
+            else:
+                _end(waiting)
+    if process is None:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "suboctave.workers"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            env=surroundings[0],
+        )
     with suppress(OSError):  # it has died already: noticed when a task is sent
-        _send(process.stdin, payload)
+        _send(process.stdin, _FUNCTION, payload)
     return process
 
 
-def _send(stream: Any, block: bytes) -> None:
-    """A block of bytes behind its length."""
-    stream.write(len(block).to_bytes(8, "little") + block)
+@atexit.register
+def _end_idle() -> None:
+    """No process waits for one that is over."""
+    while _idle:
+        _end(_idle.pop()[1])
+
+
+#: what a block of bytes is
+_FUNCTION, _TASK, _ANSWER = b"F", b"T", b"A"
+
+
+def _send(stream: Any, kind: bytes, block: bytes) -> None:
+    """A block of bytes behind its kind and its length."""
+    stream.write(kind + len(block).to_bytes(8, "little") + block)
     stream.flush()
 
 
-def _receive(stream: Any) -> bytes:
-    """The block that was sent; EOFError where the other side is gone."""
-    head = stream.read(8)
-    block: bytes = stream.read(int.from_bytes(head, "little")) if len(head) == 8 else b""
-    if len(head) < 8 or len(block) < int.from_bytes(head, "little"):
+def _receive(stream: Any) -> tuple[bytes, bytes]:
+    """The kind and the block that were sent; EOFError where the other side is gone."""
+    head = stream.read(9)
+    length = int.from_bytes(head[1:], "little")
+    block: bytes = stream.read(length) if len(head) == 9 else b""
+    if len(head) < 9 or len(block) < length:
         raise EOFError
-    return block
+    return head[:1], block
 
 
 def main() -> None:
-    """What such a process runs: first the function, then task after task from standard input."""
+    """What such a process runs: a function, and task after task for it, from standard input."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that hands out tasks
     given, answers = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what a task prints must not lie among the answers
-    arrived: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+    arrived: queue.SimpleQueue[tuple[bytes, bytes]] = queue.SimpleQueue()
     threading.Thread(target=_listen, args=(given, arrived), daemon=True).start()
     warnings.simplefilter("ignore")  # the process that hands out tasks has said what is to be said
     function: Function | None = None
     failure: BaseException | None = None
-    try:
-        function = pickle.loads(arrived.get())
-    except Exception as error:
-        failure = InputError(f"what is to be computed cannot be loaded by a worker: {type(error).__name__}: {error}")
-    while True:
-        task = arrived.get()
-        result = None
-        if function is not None:
-            failure = None
+    with suppress(queue.Empty):
+        while True:
+            kind, block = arrived.get(timeout=_WAITS)
+            result = None
             try:
-                result = function(pickle.loads(task))
+                if kind == _FUNCTION:
+                    function, failure = None, None
+                    function = pickle.loads(block)
+                elif function is not None:
+                    failure = None
+                    result = function(pickle.loads(block))
             except Exception as error:
                 failure = error
-        _send(answers, _packed(result, failure))
+                if kind == _FUNCTION:
+                    words = f"{type(error).__name__}: {error}"
+                    failure = InputError(f"what is to be computed cannot be loaded by a worker: {words}")
+            if kind == _TASK:
+                _send(answers, _ANSWER, _packed(result, failure))
+
+
+def _own_modules() -> bool:
+    """Whether modules are loaded that belong to no installed package: their files may change."""
+    installed = tuple({sys.prefix, sys.base_prefix, sys.exec_prefix, os.path.dirname(__file__)})
+    files = (getattr(module, "__file__", None) for module in list(sys.modules.values()))
+    return any(file is not None and not os.path.abspath(file).startswith(installed) for file in files)
 
 
 def _packed(result: Any, error: BaseException | None) -> bytes:
     try:
-        return pickle.dumps((result, error), pickle.HIGHEST_PROTOCOL)
+        return pickle.dumps((result, error, _own_modules()), pickle.HIGHEST_PROTOCOL)
     except Exception as failure:
         what = failure if error is None else error
-        return pickle.dumps((None, SuboctaveError(f"{type(what).__name__}: {what}")))
+        return pickle.dumps((None, SuboctaveError(f"{type(what).__name__}: {what}"), True))
 
 
-def _listen(stream: BinaryIO, arrived: queue.SimpleQueue[bytes]) -> None:
+def _listen(stream: BinaryIO, arrived: queue.SimpleQueue[tuple[bytes, bytes]]) -> None:
     """Pass on what comes; end the process, even in the middle of a task, when whoever sends it is gone."""
     while True:
         try:
