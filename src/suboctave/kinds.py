@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from suboctave.errors import suggest
 
-__all__ = ["KINDS", "MOTION_KINDS", "TRACKED_KINDS", "Kind", "suggest_kind"]
+__all__ = ["KINDS", "MOTION_KINDS", "TRACKED_KINDS", "Kind", "plane_of_curve", "suggest_kind"]
 
 _WHITE, _INK, _GREY = "#ffffff", "#1a1a1a", "#8c8c8c"
 
@@ -128,3 +128,15 @@ def suggest_kind(name: str, known: Iterable[str] = tuple(KINDS)) -> str:
 TRACKED_KINDS = tuple(name for name, kind in KINDS.items() if kind.equations and kind.choices is None)
 #: kinds whose curves begin at any motion beside them
 MOTION_KINDS = tuple(name for name, kind in KINDS.items() if kind.choices is not None)
+
+
+def plane_of_curve(kind: str, names: tuple[str, ...], turning: str = "") -> tuple[str, str] | None:
+    """The two parameters over which a curve of bifurcations is drawn, by its free parameters: of a curve of extrema the
+    third one and the extreme one. None of motions that no load drives, which are drawn over their parameter as
+    responses are, and of these.
+    """
+    if turning:
+        return names[-1], turning
+    if len(names) < 2 or KINDS[kind].free_phase:
+        return None
+    return names[-2], names[-1]

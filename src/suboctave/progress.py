@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from html import escape
 from time import monotonic
 from typing import Any
@@ -56,16 +57,50 @@ class PartOf:
         self.report((self.number + share) / self.count, f"{self.title}, {where}")
 
 
+class Search:
+    """Reports of a search that follows curves on its way, and of each of these: its words stand behind those of the
+    search, and the share stays that of the search.
+    """
+
+    def __init__(self, report: Report) -> None:
+        self.report, self.share, self.where = report, 0.0, ""
+        self.followed: Callable[[Any], None] | None = getattr(report, "followed", None)
+
+    def at(self, share: float, where: str) -> None:
+        """The search has come so far."""
+        self.share, self.where = max(self.share, share), where
+        self.report(self.share, where)
+
+    def __call__(self, share: float, where: str) -> None:
+        self.report(self.share, f"{self.where}, {where}" if self.where else where)
+
+
+#: the search within which curves are followed
+_SEARCH: ContextVar[Search | None] = ContextVar("_SEARCH", default=None)
+
+
+@contextmanager
+def searching(progress: Any, title: str) -> Iterator[Search | None]:
+    """As `reporting`, of a search: curves that are followed within, silent ones, report to it."""
+    with reporting(progress, title) as report:
+        search = None if report is None else Search(report)
+        token = _SEARCH.set(search)
+        try:
+            yield search
+        finally:
+            _SEARCH.reset(token)
+
+
 @contextmanager
 def reporting(progress: Any, title: str) -> Iterator[Report | None]:
     """A function (share done, where) to report to, or None.
 
-    `progress` is None or False (silent), True (a bar in a notebook, or on standard error, silent where that is not a
-    terminal), or a callable that takes the share done, 0 to 1, and a text. If that has a method `followed`, it is
-    called after each point with the trace so far (points, bifurcations): a journal keeps it.
+    `progress` is None or False (silent; within a search that reports, to that), True (a bar in a notebook, or on
+    standard error, silent where that is not a terminal), or a callable that takes the share done, 0 to 1, and a text.
+    If that has a method `followed`, it is called after each point with the trace so far: a journal keeps it.
     """
     if progress is None or progress is False:
-        yield None
+        yield _SEARCH.get()
     elif progress is True:
         with notebook_bar(title) if in_notebook() else bar(title) as report:
             yield report

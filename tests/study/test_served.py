@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import http.client
 import re
+from itertools import pairwise
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -12,7 +13,7 @@ import pytest
 from suboctave.study import served
 from suboctave.study.file import read_study
 from suboctave.study.runner import JOURNAL, run_study
-from suboctave.study.watching import REFRESH, Watching
+from suboctave.study.watching import REFRESH, Watching, curves_so_far
 
 EVIL = "<script>alert('x')</script>"
 
@@ -102,6 +103,61 @@ def test_the_page_of_a_run_shows_what_was_found_so_far(study_file, monkeypatch):
     watching.finish(outcome)
     assert "What was found" in watching.page()
     assert EVIL not in watching.page()
+
+
+SEARCH = """[system]
+library = "duffing"
+arguments = { c = 0.1, F = 0.05 }
+
+[[analyses]]
+name = "isolas"
+type = "find_isolas"
+omega = [0.9, 1.6]
+parameter = "F"
+bounds = [0.05, 0.2]
+harmonics = 3
+depth = 0
+levels = []
+search = []
+values = 2
+"""
+
+
+@pytest.mark.parametrize("workers", ["1", pytest.param("2", marks=pytest.mark.slow)])
+def test_curves_of_a_search_grow_on_the_page(study_file, monkeypatch, workers):
+    """Those that it follows itself point by point, those that other processes follow when they are complete."""
+    monkeypatch.setattr("suboctave.study.runner._OFTEN", 0.0)
+    monkeypatch.setenv("SUBOCTAVE_WORKERS", workers)
+    study = read_study(study_file(SEARCH, "search.toml"))
+    watching, shares, seen = Watching(study, study.folder), [], []
+
+    class Progress:
+        def __enter__(self):
+            return watching.reporting(self)
+
+        def __call__(self, share, where):
+            shares.append(share)
+            if len(shares) % 5:
+                return
+            curves = curves_so_far(study.folder / JOURNAL).get("isolas", {})
+            seen.append({axes: sum(curve.sizes["point"] for curve in own) for axes, own in curves.items()})
+
+        def __exit__(self, *_):
+            pass
+
+    def watch(step):
+        watching.begin(step.name)
+        return Progress()
+
+    run_study(study, watch=watch, report=watching.note)
+    sizes = [one.get("omega", 0) for one in seen]
+    planes = [one.get(("omega", "F"), 0) for one in seen]
+    assert shares == sorted(shares)
+    assert shares[-1] > 0.2
+    for counts in (sizes, planes):
+        assert counts[-1] > 20
+    for counts in (sizes, planes) if workers == "1" else (planes,):
+        assert max(b - a for a, b in pairwise(counts)) <= 10
 
 
 def test_show_page_serves_the_report_of_a_results_file(study_file, suboctave, monkeypatch):

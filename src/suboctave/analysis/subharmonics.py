@@ -36,7 +36,7 @@ from suboctave.interruption import Interruption, limited, pass_on
 from suboctave.model.inputs import check_count, check_omega, check_range, check_system, start_state
 from suboctave.model.system import System
 from suboctave.options import RunOptions, with_options
-from suboctave.progress import Report, reporting
+from suboctave.progress import Report, Search, reporting
 from suboctave.results.branch import Branch
 from suboctave.timedomain import integrate
 
@@ -145,20 +145,14 @@ def isolated_branches(
 def _branches(curve: MotionProblem, seeds: Seeds, run: CurveRun, known: Sequence[Branch] = ()) -> Iterator[Branch]:
     """The branches of the motions that a search meets, each once, without those that are known."""
     branches = list(known)
-    searched = 0.0
-
-    def looking(share: float, where: str) -> None:
-        nonlocal searched
-        searched = share
-        run.report(share, where)
-
     # the share reported is that of the range that was searched: following branches on the way adds nothing
-    silent = run.settings.report is None
-    following = None if silent else lambda _, where: run.report(searched, where)
-    for point in _motions(run.scaled(curve), seeds, run, looking):
+    search = Search(run.report if run.settings.report is None else run.settings.report.report)
+    for point in _motions(run.scaled(curve), seeds, run, search.at):
         if any(lies_on(Sample(point).orbit, branch.points) for branch in branches):
             continue
-        own = replace(run, settings=run.settings.reporting_to(following, run.ends))
+        own = replace(
+            run, settings=run.settings.reporting_to(None if run.settings.report is None else search, run.ends)
+        )
         trace = both_ways(point, own.ahead, own.bounds, own.settings)
         if trace.points:
             branches.append(own.branch(trace))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 
 from suboctave.bifurcation.bifurcation import CONTACT_KINDS
 from suboctave.continuation import CurvePoint, March
@@ -10,7 +11,7 @@ from suboctave.continuation.ending import Ending, EndReason
 from suboctave.curves.identity import drop_seam
 from suboctave.curves.motion import MotionProblem
 from suboctave.curves.sample import Sample
-from suboctave.curves.trace import Settings, Trace
+from suboctave.curves.trace import CurveDescription, Settings, Trace
 from suboctave.errors import ConvergenceError, NotFiniteError
 from suboctave.interruption import Interruption
 
@@ -25,6 +26,10 @@ class Driver(ABC):
         self.trace = Trace()
         #: the last sample taken in
         self.previous: Sample | None = None
+        #: somebody who keeps the curve so far (`progress.reporting`)
+        self._keeper: Callable[[Trace], None] | None = None
+        if settings.report is not None:
+            self._keeper = getattr(settings.report.report, "followed", None)
 
     @abstractmethod
     def _walk(self) -> None:
@@ -68,3 +73,7 @@ class Driver(ABC):
         basis, located = curve.balance.basis, sum(b.kind not in CONTACT_KINDS for b in trace.bifurcations)
         numbers = len(trace.points), located, basis.harmonics // basis.nu
         self.settings.report.at(point.parameter, curve.where(point.u), *numbers)
+        if self._keeper is not None and trace.points:
+            kind = curve.augmentation
+            trace.of = CurveDescription(curve.names, kind.name, kind.turning, self.settings.observe)
+            self._keeper(trace)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from bisect import insort
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
@@ -105,10 +104,6 @@ class _Follower(Driver):
         self._watch: DoublingWatch | None = None
         if settings.formulation.test is not None:
             self._watch = DoublingWatch(settings.formulation.test, self._kinds["PD"], self._located)
-        #: somebody who keeps the curve so far (`progress.reporting`)
-        self._keeper: Callable[[Trace], None] | None = None
-        if settings.report is not None:
-            self._keeper = getattr(settings.report.report, "followed", None)
 
     def _walk(self) -> None:
         # in a fresh installation the first verdict on stability waits for its kernels to be compiled
@@ -321,8 +316,6 @@ class _Follower(Driver):
         self._passed = [] if step is None else step.inside
         self._look_behind(self._passed)
         self._report(point)
-        if self._keeper is not None:
-            self._keeper(self.trace)
 
     def _bifurcation(self, located: Located, a: Sample, b: Sample) -> Bifurcation | None:
         notes: list[Note] = []

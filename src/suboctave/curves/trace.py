@@ -256,6 +256,18 @@ class Settings:
         return replace(self, report=progress)
 
 
+@dataclass(frozen=True)
+class CurveDescription:
+    """What a curve is: its free parameters, the kind of its motions, of extrema the parameter that turns, and the DOF
+    that is observed.
+    """
+
+    names: tuple[str, ...]
+    kind: str
+    turning: str
+    observe: int
+
+
 @dataclass
 class Trace:
     """What following a curve in one direction gave.
@@ -268,6 +280,8 @@ class Trace:
         Why it ends at its first and at its last point.
     departs, arrives
         Bifurcations of other branches that it leaves at its beginning and meets at its end.
+    of
+        What the curve is.
     """
 
     points: list[BranchPoint] = field(default_factory=list)
@@ -281,6 +295,7 @@ class Trace:
     endings: tuple[Ending, Ending] = (Ending(EndReason.START), Ending(EndReason.NOT_STARTED))
     departs: Bifurcation | None = None
     arrives: Bifurcation | None = None
+    of: CurveDescription | None = None
 
     @property
     def interrupted(self) -> bool:

@@ -8,7 +8,7 @@ a curve a branch can be followed at any value that the curve reaches.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -28,6 +28,7 @@ from suboctave.curves.identity import Relation, gap_to, lies_on, relation
 from suboctave.curves.junction import period_name
 from suboctave.curves.sample import Sample
 from suboctave.curves.starts import Harmonics, harmonics_of, make_curve, own_linear_part, rule_of, start_point
+from suboctave.curves.trace import CurveDescription, Trace
 from suboctave.errors import ConvergenceError, InputError, is_number, shortened
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.interruption import Interruption, pass_on
@@ -35,7 +36,7 @@ from suboctave.maps.pieces import MonotonePiece, pieces_of
 from suboctave.model.inputs import check_bounds, check_count, check_parameter, check_range, check_system
 from suboctave.model.system import System
 from suboctave.pictures.cells import Pictured
-from suboctave.progress import reporting
+from suboctave.progress import Search, searching
 from suboctave.results.branch import Branch, TrackedBranch
 from suboctave.results.diagram import BifurcationDiagram
 from suboctave.store.registry import Stored
@@ -105,13 +106,13 @@ class Work:
     """What is said of long work: what it could not settle, how far it has come, what stopped it before its end."""
 
     notes: list[Note] = field(default_factory=list)
-    report: Callable[[float, str], None] | None = None
+    report: Search | None = None
     interruption: Interruption | None = None
 
     @contextmanager
     def reporting(self, progress: Any, title: str, kept: str = _KEPT) -> Iterator[None]:
         """Report the work within to `progress`; Ctrl-C and time limits end it, which is noted with what is `kept`."""
-        with reporting(progress, title) as self.report:
+        with searching(progress, title) as self.report:
             try:
                 yield
             except KeyboardInterrupt as cause:
@@ -134,7 +135,13 @@ class Work:
     def progress(self, share: float, where: str) -> None:
         """Report how far the work has come."""
         if self.report is not None:
-            self.report(share, where)
+            self.report.at(share, where)
+
+    def show(self, branch: Branch) -> None:
+        """Show a branch that was followed elsewhere to whoever keeps curves."""
+        if self.report is not None and self.report.followed is not None and len(branch):
+            of = CurveDescription((branch.name,), "", "", branch.observe)
+            self.report.followed(Trace(list(branch.points), bifurcations=list(branch.bifurcations), of=of))
 
 
 @dataclass(eq=False)
@@ -222,16 +229,10 @@ class Catalogue(Work):
                 if len(diagram.responses) > 1 or (len(root) and root.points[-1].orbit.omega == ends[1]):
                     return
 
-    def resonant(
-        self, value: float, order: int, seeds: Seeds | None, known: Sequence[Branch], share: float = 0.0
-    ) -> list[Branch]:
-        """Branches of a period at a value that a search among resonances meets, without those that are known.
-
-        `share` of the work, for progress.
-        """
-        what, found = f"{period_name(order)} motions", list[Branch]()
-        self.progress(share, f"searching {what} at {self.name} = {value:.6g}")
-        with self.noting(self.open(f"the search for {what} failed", value)):
+    def resonant(self, value: float, order: int, seeds: Seeds | None, known: Sequence[Branch]) -> list[Branch]:
+        """Branches of a period at a value that a search among resonances meets, without those that are known."""
+        found: list[Branch] = []
+        with self.noting(self.open(f"the search for {period_name(order)} motions failed", value)):
             at = self.at(value), self.omega, order, known, self.harmonics
             found += isolated_branches(*at, seeds=seeds or _COARSE, **self.options)
         return found
@@ -328,7 +329,17 @@ class AtValues(ABC):
         """What there is at each place, in order; what could not be settled is noted in `noted`."""
         for found, notes in in_order(self, places, workers):
             noted.notes += notes
+            if workers > 1:
+                for branch in _branches_of(found):
+                    noted.show(branch)
             yield found
+
+
+def _branches_of(found: Iterable[Any]) -> Iterator[Branch]:
+    """The branches among what was found."""
+    for item in found:
+        one = item[0] if isinstance(item, tuple) else item
+        yield from one.branches if isinstance(one, BifurcationDiagram) else (one,) if isinstance(one, Branch) else ()
 
 
 def branch_through(

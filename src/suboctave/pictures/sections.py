@@ -317,8 +317,8 @@ def pictured(name: str, item: Any) -> Figure:
 
 
 def picture_of(curves: Sequence[xarray.Dataset]) -> str:
-    """Response curves as a still picture (SVG, base64)."""
-    drawing = response_drawing([list(curves)])
+    """Response curves, or curves of bifurcations, as a still picture (SVG, base64)."""
+    drawing = boundary_drawing(curves) if is_boundary(curves[0]) else response_drawing([list(curves)])
     return base64.b64encode(image_of(figure_of(drawing, style.sheet_of(_SIZE)), "svg")).decode("ascii")
 
 

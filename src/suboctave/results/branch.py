@@ -21,7 +21,7 @@ from suboctave.curves.trace import Audit, BranchPoint, TrackedPoint, bound
 from suboctave.errors import GivenDof, InputError, suggest
 from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.orbit import PeriodicOrbit
-from suboctave.kinds import KINDS
+from suboctave.kinds import KINDS, plane_of_curve
 from suboctave.model.system import System
 from suboctave.pictures.cells import Pictured
 from suboctave.results.linear import linear_trace
@@ -495,11 +495,7 @@ class TrackedBranch(Branch):
         """The two parameters that it is drawn over: of a curve of extrema the third one and the extreme one; None of
         limit cycles, which are drawn over their parameter as responses are.
         """
-        if self.turning:
-            return self.names[-1], self.turning
-        if KINDS[self.kind].free_phase:
-            return None
-        return (self.names[0], self.names[1]) if len(self.names) == 2 else (self.names[1], self.names[2])
+        return plane_of_curve(self.kind, self.names, self.turning)
 
     @property
     def extrema(self) -> list[Bifurcation]:

@@ -20,9 +20,11 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from suboctave.analysis.diagram import Keeper
+from suboctave.curves.trace import Trace
 from suboctave.errors import ConvergenceError, FunctionError, InputError, TimeLimitError
 from suboctave.experiments.common import TimeResult
 from suboctave.interruption import Interruption, check_seconds, time_limit
+from suboctave.kinds import plane_of_curve
 from suboctave.maps.isolas.result import Isolas
 from suboctave.results.branch import Branch
 from suboctave.store.journal import Journal, read_journal
@@ -293,7 +295,7 @@ class Noting:
         self.journal, self.name, self.key, self.allow_code, self.progress = journal, name, key, allow_code, progress
         self.since = perf_counter()
         #: of the curve that is followed: itself, its number, its points and events that are written down
-        self.trace: Any = None
+        self.trace: Trace | None = None
         self.number, self.points, self.events = -1, 0, 0
         self._own = [record for record in journal.records if record.fields.get("key") == key]
         self._branches = {(r.fields["parent"], r.fields["event"]): r for r in self._own if r.kind == "branch"}
@@ -338,27 +340,37 @@ class Noting:
         if self.progress is not None:
             self.progress(share, where)
 
-    def followed(self, trace: Any) -> None:
+    def followed(self, trace: Trace) -> None:
         """Called at each point of a curve with what there is of it so far, which is written down now and then."""
-        now = perf_counter()
         if trace is not self.trace:
+            self._note()  # the rest of the curve before
             self.trace, self.number, self.points, self.events = trace, self.number + 1, 0, 0
-        events = len(trace.bifurcations)
-        if now - self.since < _OFTEN and events == self.events:
+        if perf_counter() - self.since >= _OFTEN or len(trace.bifurcations) != self.events:
+            self._note()
+
+    def _note(self) -> None:
+        """Write down what is new of the curve that is followed."""
+        trace = self.trace
+        if trace is None or trace.of is None or len(trace.points) == self.points:
             return
-        self.since = now
-        points, located = trace.points[self.points :], trace.bifurcations[self.events :]
+        self.since = perf_counter()
+        of, points, located = trace.of, trace.points[self.points :], trace.bifurcations[self.events :]
         fields = {
             "name": self.name,
             "curve": self.number,
             "from": self.points,
+            "free": list(of.names),
+            "kind": of.kind,
+            "plane": plane_of_curve(of.kind, of.names, of.turning),
+            "period": points[0].orbit.basis.nu,
             "omega": [point.orbit.omega for point in points],
             "values": [dict(point.orbit.values) for point in points],
-            "coefficients": [point.orbit.coefficients.tolist() for point in points],
+            "amplitude": [point.orbit.amplitude(of.observe) for point in points],
             "stable": [bool(point.floquet.stable) for point in points],
-            "bifurcations": [[b.kind, b.omega, dict(b.parameters), b.amplitude] for b in located],
+            "arclength": [point.arclength for point in points],
+            "bifurcations": [[b.kind, b.omega, dict(b.parameters), b.amplitude, b.arclength] for b in located],
         }
-        self.points, self.events = len(trace.points), events
+        self.points, self.events = len(trace.points), len(trace.bifurcations)
         self.journal.append("points", fields)
 
 
@@ -398,7 +410,7 @@ def recovered(path: str | Path) -> list[Recovered]:
             if not fields["from"] and not fields.get("curve"):
                 item.over()
             item.under_way += len(fields["omega"])
-            item.events += [(kind, omega, amplitude) for kind, omega, _, amplitude in fields["bifurcations"]]
+            item.events += [(kind, omega, amplitude) for kind, omega, _, amplitude, _ in fields["bifurcations"]]
             continue
         item.over()
         sizes = record.dataset.sizes

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from suboctave.errors import SuboctaveError
+from suboctave.pictures.boundary import plane_of
+from suboctave.pictures.given import is_boundary
 from suboctave.pictures.report import page_of, template
 from suboctave.pictures.sections import picture_of
 from suboctave.store.journal import read_journal
@@ -26,8 +28,6 @@ if TYPE_CHECKING:
 
 #: seconds after which the page asks again
 REFRESH = 2
-#: samples of a motion of which its amplitude is taken while the run is under way
-_SAMPLES = 256
 #: points from which a curve is drawn, and curves in the picture of one analysis
 _DRAWN, _CURVES = 2, 12
 
@@ -48,7 +48,7 @@ class Watching:
         self.over: dict[str, Finished] = {}
         self._lock = threading.Lock()
         #: pictures by analysis, with the sizes of the curves that they show
-        self._stills: dict[str, tuple[list[int], str]] = {}
+        self._stills: dict[tuple[str, Axes], tuple[list[int], str]] = {}
 
     def begin(self, name: str) -> None:
         """An analysis is begun."""
@@ -86,7 +86,7 @@ class Watching:
         path = self.folder / JOURNAL
         try:
             known = {item.name: item for item in recovered(path)}
-            curves = curves_so_far(path, self.study.system.observed_dof)
+            curves = curves_so_far(path)
         except (SuboctaveError, OSError):  # not there yet, or no more
             known, curves = {}, {}
         rows = []
@@ -104,7 +104,11 @@ class Watching:
             for name, item in known.items()
             for kind, omega, amplitude in item.events
         ]
-        pictures = [(name, self._still(name, own)) for name, own in curves.items()]
+        pictures = [
+            (name, axes if isinstance(axes, str) else " and ".join(axes), self._still(name, axes, own))
+            for name, several in curves.items()
+            for axes, own in several.items()
+        ]
         text: str = template("watch.html").render(
             title=self.study.title or self.study.called,
             seconds=f"{perf_counter() - self.since:.0f}",
@@ -115,16 +119,20 @@ class Watching:
         )
         return text
 
-    def _still(self, name: str, curves: list[xarray.Dataset]) -> str:
-        """The picture of an analysis, drawn anew when it has more points."""
+    def _still(self, name: str, axes: Axes, curves: list[xarray.Dataset]) -> str:
+        """A picture of an analysis, drawn anew when it has more points."""
         sizes = [data.sizes["point"] for data in curves]
-        if self._stills.get(name, ([], ""))[0] != sizes:
-            self._stills[name] = sizes, picture_of(curves)
-        return self._stills[name][1]
+        if self._stills.get((name, axes), ([], ""))[0] != sizes:
+            self._stills[name, axes] = sizes, picture_of(curves)
+        return self._stills[name, axes][1]
 
 
-def curves_so_far(path: Path, dof: int) -> dict[str, list[xarray.Dataset]]:
-    """The response curves that a journal holds, by analysis; of those under way amplitudes are of samples."""
+#: what curves are drawn over: the free parameter of responses, the plane of curves of bifurcations
+Axes = str | tuple[str, str]
+
+
+def curves_so_far(path: Path) -> dict[str, dict[Axes, list[xarray.Dataset]]]:
+    """The curves that a journal holds, by analysis and by what they are drawn over."""
     curves: dict[str, list[xarray.Dataset]] = {}
     begun: dict[str, dict[int, list[dict[str, Any]]]] = {}
     for record in read_journal(path):
@@ -137,37 +145,40 @@ def curves_so_far(path: Path, dof: int) -> dict[str, list[xarray.Dataset]]:
         elif record.kind in ("branch", "analysis"):
             dataset = record.dataset
             begun.pop(name, None)
-            if dataset.attrs.get("contents") == "branch" and not dataset.attrs.get("tracked"):
+            if dataset.attrs.get("contents") == "branch":
                 curves.setdefault(name, []).append(dataset)
     for name, several in begun.items():
         for parts in several.values():
-            curve = _of_points(parts, dof)
+            curve = _of_points(parts)
             if curve is not None:
                 curves.setdefault(name, []).append(curve)
-    return {name: own[-_CURVES:] for name, own in curves.items() if own}
+    together: dict[str, dict[Axes, list[xarray.Dataset]]] = {}
+    for name, own in curves.items():
+        for curve in own:
+            axes = plane_of(curve) if is_boundary(curve) else str(curve.attrs["free"])
+            together.setdefault(name, {}).setdefault(axes, []).append(curve)
+    return {name: {axes: own[-_CURVES:] for axes, own in several.items()} for name, several in together.items()}
 
 
-def _of_points(parts: list[dict[str, Any]], dof: int) -> xarray.Dataset | None:
+def _of_points(parts: list[dict[str, Any]]) -> xarray.Dataset | None:
     """The points that were written down of a curve that is being followed."""
     omega = np.array([value for part in parts for value in part["omega"]])
     values = [one for part in parts for one in part["values"]]
     if len(omega) < _DRAWN:
         return None
     parameters = {name: np.array([one[name] for one in values]) for name in values[0]}
-    varied = [name for name, column in parameters.items() if np.ptp(column) > 0.0]
-    free = "omega" if np.ptp(omega) > 0.0 or not varied else varied[0]
-    motions = [np.array(c)[:, dof] for part in parts for c in part["coefficients"]]
-    amplitude = [float(np.max(np.abs(_sampled(c)))) for c in motions]
+    amplitude = [one for part in parts for one in part["amplitude"]]
     stable = [one for part in parts for one in part["stable"]]
+    arclength = np.array([one for part in parts for one in part["arclength"]])
+    located = sorted((one for part in parts for one in part["bifurcations"]), key=lambda one: float(one[-1]))
+    places = np.searchsorted(arclength, [one[-1] for one in located], side="right") - 1
     events = [
-        EventRow(str(kind), len(omega) - 2, float(at), float(size), parameters=dict(there))
-        for part in parts
-        for kind, at, there, size in part["bifurcations"]
+        EventRow(str(kind), int(after), float(at), float(size), parameters=dict(there))
+        for (kind, at, there, size, _), after in zip(located, places.clip(0, len(omega) - 2), strict=True)
     ]
-    return curve_dataset(omega, amplitude, stable=stable, parameters=parameters, free=free, events=events)
-
-
-def _sampled(c: np.ndarray) -> np.ndarray:
-    """A motion a_0, a_1, b_1, ... at equal intervals over its period."""
-    phase = np.outer(2.0 * np.pi * np.arange(_SAMPLES) / _SAMPLES, np.arange(1, len(c) // 2 + 1))
-    return np.asarray(c[0] + np.cos(phase) @ c[1::2] + np.sin(phase) @ c[2::2])
+    what = parts[0]
+    own = {"stable": stable, "parameters": parameters, "events": events, "period": what["period"]}
+    curve = curve_dataset(omega, amplitude, free=what["free"][-1], **own)
+    if what["plane"] is not None:
+        curve = curve.assign_attrs(tracked=what["kind"], plane="\n".join(what["plane"]))
+    return curve

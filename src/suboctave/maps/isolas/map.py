@@ -45,6 +45,8 @@ from suboctave.workers import check_workers, in_order
 
 #: where the map is held against closed branches, in shares of the stretch of the second parameter
 _PROBED = (0.1, 0.5, 0.9)
+#: share of the work that following the two ends is, for progress
+_ENDS = 0.5
 #: so much of the range of the design parameter may the ends differ from those of a closed branch
 _AGREES = 1e-3
 
@@ -111,8 +113,7 @@ def isola_map(
     regions = _Regions(system, name, parameter, (low, high), of_curves, workers)
     with regions.reporting(options.get("progress"), f"isolas over {name} and {parameter}"):
         for number, isola in enumerate(items):
-            regions.progress(number / len(items), f"isola {number + 1} of {len(items)}")
-            regions.follow(isola, places)
+            regions.follow(isola, places, number, len(items))
     within = isolas.bounds if isinstance(isolas, Isolas) else None
     return IsolaMap(
         regions.regions, system, name, parameter, within, (low, high), regions.unsettled, regions.interruption
@@ -143,8 +144,12 @@ class _Regions(Work):
     regions: list[IsolaRegion] = field(default_factory=list)
     tracked: list[tuple[IsolaEnd, TrackedBranch]] = field(default_factory=list)
 
-    def follow(self, isola: Isola, probes: Any) -> None:
-        """The region of an isola, if its ends can be followed, and what closed branches within say of it."""
+    def follow(self, isola: Isola, probes: Any, number: int, count: int) -> None:
+        """The region of an isola, one of `count`, if its ends can be followed, and what closed branches within say."""
+
+        def at(part: float, where: str) -> None:
+            self.progress((number + part) / count, f"isola {number + 1} of {count}, {where}")
+
         name, second = self.name, self.second
         here = float(self.system.parameters[second])
         ends: list[MonotonePiece | float] = []
@@ -156,6 +161,7 @@ class _Regions(Work):
                 self.notes.append(Note(text, second, here, here))
                 continue
             place = name, float(end), float(end), end.kind.replace("_", " ")
+            at(0.0 if not ends else _ENDS / 2.0, place[-1])
             try:
                 curve = self._curve(end)
             except ConvergenceError as failure:
@@ -174,6 +180,7 @@ class _Regions(Work):
         (low, high), reasons, closed, settled = zip(*sides, strict=True)
         span = Span(low, high, both, reasons, closed, settled)
         self.notes += [Note(reason) for reason, settled in zip(span.reasons, span.settled, strict=True) if not settled]
+        at(_ENDS, "closed branches")
         looks = tuple(self._probes(isola, span, probes))
         self.regions.append(IsolaRegion(isola, second, span, tuple(curves), looks))
 

@@ -37,8 +37,6 @@ from suboctave.maps.isolas.result import Isola, IsolaEnd, Isolas
 from suboctave.maps.pieces import MonotonePiece
 from suboctave.results.branch import Branch
 
-#: share of the work that the responses make, for progress
-PREPARATION = 0.6
 #: events that are closer, in units of the parameter's range, are met together
 _TOGETHER = 1e-7
 #: halvings of the interval in which a branch ceases to be detached for no known reason
@@ -65,12 +63,15 @@ class Loop:
 
 @dataclass
 class Stage:
-    """A part of a search in words, at how many places it looks, and at how many it has; `leads` to limit points."""
+    """A part of a search in words, at how many places it looks, and at how many it has; `leads` to limit points,
+    `spare`: left out where isolas are known.
+    """
 
     words: str
     planned: int
     done: int = 0
     leads: bool = True
+    spare: bool = False
 
     @property
     def so_far(self) -> str:
@@ -114,9 +115,15 @@ class Search:
         values = self.values
         return sorted({values[0], values[len(values) // 2], values[-1]})
 
-    def settle(self, values: Sequence[float] = ()) -> None:
+    def at(self, where: str, part: float = 0.0) -> None:
+        """Report where the search is, and which part of the place that it looks at is done."""
+        done = sum(stage.done for stage in self.stages)
+        left = sum(stage.planned - stage.done for stage in self.stages if not (stage.spare and self.isolas))
+        self.catalogue.progress((done + part) / max(done + left, 1), where)
+
+    def settle(self, values: Sequence[float] = (), stage: Stage | None = None) -> None:
         """The isolas that limit points known lie on: near centres, and at values at which responses were followed."""
-        for piece, value in self._starts(values):
+        for piece, value in self._starts(values, stage):
             loop = self.through(piece, value)
             if loop is not None:
                 self._consider(loop)
@@ -140,7 +147,6 @@ class Search:
             self.hold(known, loop, loop.value, loop.value)
             return
         catalogue, value = self.catalogue, loop.value
-        catalogue.progress(PREPARATION, f"closed branch at {catalogue.name} = {value:.6g}")
         # to begin with at a single value
         reasons = ("not followed to lower values", "not followed to higher values")
         isola = Isola(
@@ -149,10 +155,11 @@ class Search:
         )  # fmt: skip
         low, high = (_Direction(upper, isola, self) for upper in (False, True))
         self.isolas.append(isola)
+        self.at(f"closed branch at {catalogue.name} = {value:.6g}")
         for direction in (low, high):
             direction.settle(loop)
 
-    def _starts(self, values: Sequence[float]) -> Iterator[tuple[MonotonePiece, float]]:
+    def _starts(self, values: Sequence[float], stage: Stage | None) -> Iterator[tuple[MonotonePiece, float]]:
         """Limit points that may lie on an isola: beside centres, then those that no branch met explains."""
         done: set[int] = set()
         yield from self._centres(done)
@@ -163,6 +170,8 @@ class Search:
                     yield piece, value
                     # of curves that have become known by that
                     yield from self._centres(done)
+            if stage is not None:
+                stage.done += 1
 
     def _centres(self, done: set[int]) -> Iterator[tuple[MonotonePiece, float]]:
         """Limit points beside centres that are not `done`, also of curves that become known on the way."""

@@ -32,7 +32,7 @@ from suboctave.errors import InputError, is_number, refuse_idle
 from suboctave.maps.catalogue import Catalogue, checked_orders, checked_values, listed
 from suboctave.maps.isolas.responses import FROM_LOADS, Responses, UnderOtherLoads, followed_doublings
 from suboctave.maps.isolas.result import Isolas
-from suboctave.maps.isolas.search import PREPARATION, Loop, Search, Stage
+from suboctave.maps.isolas.search import Loop, Search, Stage
 from suboctave.model.inputs import check_count, timed
 from suboctave.model.system import System
 from suboctave.options import with_options
@@ -146,12 +146,14 @@ def _planned(
     name, count = search.catalogue.name, len(search.values)
 
     def stage(words: str, fewer: bool, leads: bool = True) -> Stage:
-        search.stages.append(Stage(words, len(search.few) if fewer else count, leads=leads))
+        search.stages.append(Stage(words, len(search.few) if fewer else count, leads=leads, spare=fewer))
         return search.stages[-1]
 
     responses = stage(f"the responses at {{}} values of {name}", False)
     branches = stage(f"the other branches that their limit points lie on at {{}} values of {name}", False, False)
-    others = Stage("those at {} other levels of the loads", len(_LEVELS if levels is None else levels))
+    others = Stage(
+        "those at {} other levels of the loads", len(_LEVELS if levels is None else levels), spare=levels is None
+    )
     search.stages.append(others)
     periods = {
         order: stage(f"a search for {period_name(order)} motions at {{}} values of {name}", orders is None)
@@ -163,17 +165,17 @@ def _planned(
 def _from_responses(search: Search, depth: int, workers: int, responses: Stage, branches: Stage) -> None:
     """Responses at all values, with what bifurcates from them so many bifurcations deep."""
     catalogue, count = search.catalogue, len(search.values)
-    catalogue.progress(0.0, f"{catalogue.name} = {search.values[0]:.6g}")
+    search.at(f"{catalogue.name} = {search.values[0]:.6g}")
     found = Responses(catalogue.emptied(), depth).over(list(search.values), workers, catalogue)
     for number, (value, met) in enumerate(zip(search.values, found, strict=True), 1):
-        for branch in followed_doublings(catalogue, value, met):
+        for part, branch in enumerate(followed_doublings(catalogue, value, met), 1):
             search.attach(Loop(value, branch, search.pieces_on(branch, value), False))
+            search.at(f"{catalogue.name} = {value:.6g}", part / (len(met) + 1))
         responses.done = number
         if number < count:
-            catalogue.progress(PREPARATION * number / count, f"{catalogue.name} = {search.values[number]:.6g}")
-    catalogue.progress(PREPARATION, "closed branches")
-    search.settle(search.values)
-    branches.done = count
+            search.at(f"{catalogue.name} = {search.values[number]:.6g}")
+    search.at("closed branches")
+    search.settle(search.values, branches)
 
 
 def _from_load_levels(search: Search, levels: Sequence[float] | None, depth: int, workers: int, stage: Stage) -> None:
@@ -189,7 +191,7 @@ def _from_load_levels(search: Search, levels: Sequence[float] | None, depth: int
         values = search.few if levels is None else list(search.values)
         found = UnderOtherLoads(catalogue.emptied(), depth, level).over(values, workers, catalogue)
         for value, orbits in zip(values, found, strict=True):
-            catalogue.progress(PREPARATION, f"{level:g} times the loads at {catalogue.name} = {value:.6g}")
+            search.at(f"{level:g} times the loads at {catalogue.name} = {value:.6g}")
             known = list(search.met.get(value, []))
             for orbit in orbits:
                 if any(lies_on(orbit, branch.points, images=True) for branch in known):
@@ -211,6 +213,7 @@ def _from_resonances(search: Search, chosen: bool, seeds: Seeds, stages: Mapping
             if not chosen and search.isolas:
                 return
             known = [branch for branch in search.met.get(value, []) if branch.nu == order]
-            for branch in search.catalogue.resonant(value, order, seeds, known, PREPARATION):
+            search.at(f"{period_name(order)} motions at {search.catalogue.name} = {value:.6g}")
+            for branch in search.catalogue.resonant(value, order, seeds, known):
                 search.meet(branch, value)
             stage.done += 1

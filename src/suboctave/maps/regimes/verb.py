@@ -479,6 +479,9 @@ class _Survey:
             places = [(value, _reach(self.catalogue, value)) for value in values]
             found = in_order(_Diagrams(self.catalogue.emptied(), self.longest), places, self.workers)
             for (_, reach), (diagrams, notes) in zip(places, found, strict=True):
+                for diagram in diagrams:
+                    for branch in diagram.branches:
+                        self.catalogue.show(branch)
                 yield _Foreseen(reach, diagrams, notes)
 
     def critical(self) -> list[float]:
