@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy.interpolate import Akima1DInterpolator
 
 import suboctave as so
 from suboctave.errors import InputError
-from suboctave.pictures.strokes import OPEN, bent, cut, line, without_repeats
+from suboctave.pictures.strokes import OPEN, bent, cut, line, smooth, without_repeats
 from suboctave.store.layout import UNKNOWN, EventRow, curve_dataset
 
 X = np.arange(5.0)
@@ -135,6 +136,17 @@ def test_a_line_is_drawn_through_its_vertices_and_smooth(count):
     assert off.max() < 0.3 * (1.0 - np.cos(0.5 * angle[1]))
     heading = np.unwrap(np.arctan2(np.diff(drawn[1] / 0.2), np.diff(drawn[0] / 30.0)))
     assert np.abs(np.diff(heading)).max() < 0.1 < angle[1]
+
+
+@pytest.mark.parametrize("count", [3, 4, 30])
+def test_the_line_is_that_of_modified_akima_interpolation(count):
+    """With vertices at random distances, the last third of them on a straight line."""
+    random = np.random.default_rng(count)
+    along, values = np.cumsum(random.random(count) + 0.1), random.normal(size=(count, 2))
+    values[2 * count // 3 :, 1] = along[2 * count // 3 :]
+    at = np.linspace(along[0], along[-1], 300)
+    expected = Akima1DInterpolator(along, values, method="makima")(at)
+    assert smooth(along, values, at) == pytest.approx(expected, rel=1e-12, abs=1e-12)
 
 
 def test_corners_stay():

@@ -149,7 +149,7 @@ def _leaves(box: Bbox, frame: Bbox) -> bool:
 
 def crowds(axes: Axes, frame: Frame) -> list[Label]:
     """How many events there are at places where their markers hide each other."""
-    from scipy.cluster.hierarchy import fcluster, linkage
+    from scipy.sparse.csgraph import connected_components
 
     seen = [item.at for item in frame.items if isinstance(item, Markers) and item.vertices is not None]
     every = np.concatenate(seen, axis=1).T if seen else np.empty((0, 2))
@@ -157,8 +157,9 @@ def crowds(axes: Axes, frame: Frame) -> list[Label]:
     if len(every) < _CROWD:
         return []
     near = 0.5 * style.MARKER_SIZE * axes.figure.dpi / 72.0
-    groups = fcluster(linkage(axes.transData.transform(every)), near, "distance")
-    crowds = [every[groups == number] for number in np.unique(groups)]
+    pixels = axes.transData.transform(every)
+    count, groups = connected_components(np.hypot(*(pixels[:, np.newaxis] - pixels).T) <= near)
+    crowds = [every[groups == number] for number in range(count)]
     return [
         Label(place, f"{len(own)} events at {place[0]:.4g}")
         for own in crowds

@@ -126,8 +126,6 @@ def without_repeats(pieces: Sequence[Line], earlier: list[np.ndarray], spread: t
     A branch that goes through its parent comes back as the same motion, shifted, at the same amplitude. `spread`: width
     and height of the frame. `earlier`, places (m, 2) along those drawn before in units of these, is added to.
     """
-    from scipy.spatial.distance import cdist
-
     kept: list[Line] = []
     for piece in pieces:
         if piece.stable is not False or piece.x.size < 2:
@@ -140,11 +138,16 @@ def without_repeats(pieces: Sequence[Line], earlier: list[np.ndarray], spread: t
         fresh = np.ones(len(path) - 1, dtype=bool)
         for i, probes in enumerate(zip(path[:-1], 0.5 * (path[:-1] + path[1:]), path[1:], strict=True)):
             there = np.concatenate([*earlier, own[at < along[i] - _ANOTHER]])
-            fresh[i] = not len(there) or cdist(probes, there).min(axis=1).max() > _UPON
+            fresh[i] = not len(there) or _farthest(probes, there) > _UPON
         earlier.append(own)
         cuts = np.flatnonzero(np.diff(np.concatenate([[False], fresh, [False]])))
         kept += [piece.stroke(a, b, False) for a, b in cuts.reshape(-1, 2)]
     return kept
+
+
+def _farthest(probes: Sequence[np.ndarray], places: np.ndarray) -> float:
+    """How far the farthest of some points is from the nearest of some places (m, 2)."""
+    return max(float(np.hypot(*(places - point).T).min()) for point in probes)
 
 
 #: angle between two pieces that is a corner; in units of the frame, nearest vertices that are two, and length of the
@@ -157,8 +160,6 @@ def bent(x: np.ndarray, y: np.ndarray, spread: tuple[float, float]) -> tuple[np.
 
     `spread`: width and height of the frame, in the units of x and y.
     """
-    from scipy.interpolate import Akima1DInterpolator
-
     path = np.column_stack([x / spread[0], y / spread[1]])
     if len(path) < 3 or not np.isfinite(path).all():
         return x, y
@@ -178,13 +179,32 @@ def bent(x: np.ndarray, y: np.ndarray, spread: tuple[float, float]) -> tuple[np.
             continue
         along = lengths(own)
         shares = [np.linspace(a, b, 1 + math.ceil((b - a) / _PIECE))[1:] for a, b in pairwise(along)]
-        drawn = Akima1DInterpolator(along, own, method="makima")(np.concatenate(shares))
+        drawn = smooth(along, own, np.concatenate(shares))
         # the vertices themselves, without rounding
         drawn[np.cumsum([len(share) for share in shares]) - 1] = own[1:]
         parts.append(drawn)
     whole = np.concatenate(parts) * spread
     whole[0], whole[-1] = (x[vertices[0]], y[vertices[0]]), (x[-1], y[-1])
     return whole[:, 0], whole[:, 1]
+
+
+def smooth(along: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Cubics through three or more values (knots, axes) with the slopes of modified Akima interpolation, (at, axes).
+
+    `scipy.interpolate` has them as well; to import it takes as long as to draw a curve.
+    """
+    widths = np.diff(along)[:, np.newaxis]
+    secants = np.diff(values, axis=0) / widths
+    before, behind = 2.0 * secants[0] - secants[1], 2.0 * secants[-1] - secants[-2]
+    m = np.array([2.0 * before - secants[0], before, *secants, behind, 2.0 * behind - secants[-1]])
+    weights = np.abs(np.diff(m, axis=0)) + 0.5 * np.abs(m[1:] + m[:-1])
+    whole = weights[2:] + weights[:-2]
+    share = np.divide(weights[:-2], whole, where=whole > 1e-9 * whole.max(initial=0.0), out=np.full(whole.shape, 0.5))
+    slopes = m[1:-2] + share * (m[2:-1] - m[1:-2])
+    piece = np.clip(np.searchsorted(along, at, side="right") - 1, 0, len(along) - 2)
+    u = (at - along[piece])[:, np.newaxis] / widths[piece]
+    rise, one, other = ((part * widths)[piece] for part in (secants, slopes[:-1], slopes[1:]))
+    return np.asarray(values[piece] + u * (one + u * (3.0 * rise - 2.0 * one - other + u * (one + other - 2.0 * rise))))
 
 
 #: places along a loop of a surface, from its largest to its least frequency

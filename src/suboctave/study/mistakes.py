@@ -22,7 +22,8 @@ from suboctave.errors import InputError, Key, suggest
 class Section(pydantic.BaseModel):
     """A table of a study file: no key but its own, each of its type."""
 
-    model_config = pydantic.ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
+    # a study has few of all kinds of tables: what reads one is built when it is first read
+    model_config = pydantic.ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True, defer_build=True)
 
 
 @dataclass(frozen=True)
