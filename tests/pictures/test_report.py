@@ -159,6 +159,25 @@ def test_what_found_nothing_takes_a_line(page, duffing, tmp_path):
     assert text.count("<section") == 3  # the summary, the curve, where numbers come from
 
 
+def test_results_in_time_over_frequencies_have_a_choice_of_units(tmp_path):
+    """Their axes are among those that the page converts, in the units of the system, also where no curve is on it."""
+    system = so.library.duffing(c=0.1, F=0.1).with_units("mm, N, ms")
+    times = {"values": 3, "transient": 5, "periods": 4}
+    over = {
+        "swept": so.brute_force_diagram(system, (0.5, 0.6), **times),
+        "stepped": so.stepped_sine(system, (0.5, 0.6), **times),
+    }
+    text = so.write_report(over, tmp_path / "over.html").read_text(encoding="utf-8")
+    assert re.search(r'<div id="view"[^>]* data-rad="rad/ms" data-cycles="kHz"', text)
+    assert text.count('"axes":["omega",""]') == 2
+    assert text.count("forcing frequency ω (rad/ms)") >= 2
+    other = {"load": so.brute_force_diagram(system, 0.5, "F", (0.1, 0.2), **times)}
+    assert (
+        "data-rad"
+        not in so.write_report(other, tmp_path / "other.html").read_text(encoding="utf-8").split("<script")[0]
+    )
+
+
 def test_a_page_has_a_bounded_size():
     """From all of the motions to none: each step is smaller, and says what is missing."""
     system = so.System(

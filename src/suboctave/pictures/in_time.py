@@ -25,6 +25,7 @@ from suboctave.pictures.options import (
     as_multiple,
     check_quantity,
     declared_units,
+    frequency_label,
     parts_of_dof,
     shown_multiple,
 )
@@ -121,7 +122,8 @@ def plot_brute_force(
     symbol = _symbol_of(diagram, dof, 0).strip("$")
     upwards = rf"$\max\,|{symbol}|$" if quantity == "amplitude" else rf"${symbol}(t_k)$, stroboscopic"
     upwards = _with_unit(upwards, diagram, 0)
-    across = Axis(_frequency_axis(diagram) if varied == "omega" else plain(varied), low, high)
+    text, shows = (_frequency_axis(diagram), varied) if varied == "omega" else (plain(varied), "")
+    across = Axis(text, low, high, shows=shows)
     return frame, (across, Axis(upwards))
 
 
@@ -165,7 +167,7 @@ def plot_stepped_sine(
         marks = Markers(at, Mark("+", 5.0, colour, colour), cut=True, role="measured", layer=4.2)
         frame.add(marks, plain(one.label))
     symbol = f"X_{{{shown_multiple(harmonic)}}}" + ("" if test.attrs["dofs"] == 1 else f"^{{({dof})}}")
-    axes = Axis(r"$\omega$", low, high), Axis(f"$|{symbol}|$", 0.0)
+    axes = Axis(_frequency_axis(test), low, high, shows="omega"), Axis(_with_unit(f"$|{symbol}|$", test, 0), 0.0)
     return frame, axes
 
 
@@ -251,8 +253,7 @@ def _with_unit(text: str, dataset: xarray.Dataset, order: int) -> str:
 
 
 def _frequency_axis(dataset: xarray.Dataset) -> str:
-    declared = declared_units([dataset])
-    return rf"$\omega$ ({declared.frequency})" if declared else r"$\omega$"
+    return frequency_label(declared_units([dataset]))
 
 
 def checked_dof(dataset: xarray.Dataset, dof: GivenDof | None) -> int:
@@ -336,7 +337,10 @@ def plot_lyapunov_map(chart: xarray.Dataset, *, lines: Sequence[tuple[str, np.nd
     known = list(dict.fromkeys(name for name, _, _ in lines))
     for name, x, y in lines:
         frame.add(Polyline(np.array([x, y]), Pen(_LINES[known.index(name) % len(_LINES)])), name)
-    axes = Axis(_frequency_axis(chart), *across[[0, -1]]), Axis(plain(chart.attrs["varied"]), *upwards[[0, -1]])
+    axes = (
+        Axis(_frequency_axis(chart), *across[[0, -1]], shows="omega"),
+        Axis(plain(chart.attrs["varied"]), *upwards[[0, -1]]),
+    )
     return frame, axes
 
 
@@ -427,7 +431,7 @@ def plot_verified(
         axes = Coordinates((str(curve.attrs["free"]), None), View())
         frame = response_frame([curve], axes)
         labels = axes.labels([curve])
-        across, upwards = Axis(labels[0]), Axis(labels[1], 0.0)
+        across, upwards = Axis(labels[0], shows=axes.shown[0]), Axis(labels[1], 0.0)
     every = np.concatenate([np.reshape(places, (-1, 2)), np.reshape(unconfirmed, (-1, 2))])
     kinds = np.array([*outcomes, *["not confirmed"] * len(unconfirmed)])
     for outcome, (name, mark, layer) in _MARKS.items():

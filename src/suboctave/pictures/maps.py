@@ -57,7 +57,7 @@ def plot_regimes(
     lines
         Borders: kind of bifurcation, to the right, upwards; drawn if `curves`.
     ranges, names
-        Of the plane, to the right and upwards.
+        Of the plane, to the right, where omega is, and upwards.
     labels
         What the legend calls the regimes, in their order.
     smallest
@@ -86,7 +86,7 @@ def plot_regimes(
     for kind, x, y in lines if curves else ():
         pen = Pen(style.INK, 0.65, _DASHES.get(kind, style.STABLE_DASH))
         frame.add(Polyline(np.array([x, y]), pen, role=kind), style.kind_style(kind).name)
-    axes = Axis(names[0], *ranges[0]), Axis(names[1], *ranges[1])
+    axes = Axis(names[0], *ranges[0], shows="omega"), Axis(names[1], *ranges[1])
     return frame, axes
 
 

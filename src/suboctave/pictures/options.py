@@ -184,9 +184,7 @@ class Units:
             return "forcing frequency (Hz)"
         if self.omega_reference is not None:
             return r"frequency ratio $\omega/\omega_0$"
-        declared = declared_units(datasets)
-        unit = self.frequency or (declared.frequency if declared else "")
-        return r"forcing frequency $\omega$" + (f" ({unit})" if unit else "")
+        return frequency_label(declared_units(datasets), self.frequency or "")
 
     def unit_of(self, dimension: str, datasets: Sequence[xarray.Dataset]) -> str:
         """The unit of a quantity: the one given, else, where nothing is scaled, that which the systems declare."""
@@ -488,6 +486,12 @@ class MotionView(Units):
         if self.omega_reference is not None:
             return rf"$\omega/\omega_0$ = {omega / self.omega_reference:.4g}"
         return rf"$\omega$ = {omega:.4g}" + (" rad/s" if self.frequency else "")
+
+
+def frequency_label(declared: UnitSystem | None, unit: str = "") -> str:
+    """What an axis of circular frequencies says."""
+    unit = unit or (declared.frequency if declared else "")
+    return r"forcing frequency $\omega$" + (f" ({unit})" if unit else "")
 
 
 def declared_units(datasets: Sequence[xarray.Dataset]) -> UnitSystem | None:

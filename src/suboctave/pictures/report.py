@@ -21,6 +21,7 @@ from suboctave.atomic import free_place, replace_file
 from suboctave.errors import InputError, shortened
 from suboctave.pictures import style
 from suboctave.pictures.given import is_boundary, is_isolas
+from suboctave.pictures.options import declared_units
 from suboctave.pictures.points import DETAILS, Verified, curve_data, verified_by
 from suboctave.pictures.sections import Contents, Section, anchor_of, has_points, is_empty, pictured, sections_of
 from suboctave.pictures.strokes import number_of
@@ -118,10 +119,24 @@ def page_of(results: Mapping[str, Any], title: str, failures: Mapping[str, str] 
             *_attention(sections, found),
         ],
         sections=sections,
+        frequencies=_frequencies(sections, found, results),
         curves=found.curves_known,
         plotly=_plotly() if any(section.figures or section.curves for section in sections) else "",
     )
     return text
+
+
+def _frequencies(sections: Sequence[Section], found: Found, results: Mapping[str, Any]) -> dict[str, str]:
+    """The units of circular frequencies and of cycles; empty where no figure has frequencies on an axis."""
+    figures = [figure for section in sections for figure in section.figures]
+    figures += [curve.figure for section in sections for curve in section.curves if curve.figure is not None]
+    if not any(figure.data and "omega" in figure.data["axes"] for figure in figures):
+        return {}
+    systems = (getattr(getattr(item, "result", item), "system", None) for item in results.values())
+    known = {getattr(system, "units", None) for system in systems if system is not None}
+    known |= {declared_units([dataset]) for dataset in found.every if "units" in dataset.attrs}
+    units = known.pop() if len(known) == 1 else None
+    return {"rad": units.frequency, "cycles": units.cycles} if units else {"rad": "", "cycles": ""}
 
 
 @functools.cache

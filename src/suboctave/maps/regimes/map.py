@@ -268,12 +268,12 @@ class RegimeMap(PlaneMap):
     def plot(self, path: str | Path | None = None, **options: Any) -> Any:
         """The plane coloured by regime, with the borders; options are those of `pictures.maps.plot_regimes`."""
         from suboctave.pictures.maps import plot_regimes
+        from suboctave.pictures.options import frequency_label
 
         cells, regimes = self.raster(900, 700)
         labels = [(str(r).replace(" x ", " \u00d7 "), r.motions, r.beyond) for r in regimes]
         lines = list(self._lines())
-        units = self.system.units
-        plane = (self.omega, self.bounds), (f"omega ({units.frequency})" if units else "omega", self.parameter)
+        plane = (self.omega, self.bounds), (frequency_label(self.system.units), self.parameter)
         missing = "" if self.interruption is None else f"incomplete: {self.interruption}"
         return plot_regimes(cells, labels, lines, *plane, missing=missing, path=path, **options)
 

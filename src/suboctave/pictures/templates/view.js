@@ -32,7 +32,10 @@ function unitOf(curve, quantity = view.quantity) {
 
 function withUnit(text, unit) { return unit ? `${text} (${unit})` : text; }
 
-function cyclesOf(curve) { return curve.units.cycles || "cycles per unit time"; }
+// Units of frequencies that the page knows, in rad and in cycles.
+const frequencies = document.getElementById("view")?.dataset ?? {};
+
+function cyclesOf(curve) { return curve?.units.cycles || frequencies.cycles || "cycles per unit time"; }
 
 // Which of a curve's displacements is shown: the observed one, or that of the chosen name; -1 where it has none.
 function signalOf(curve) {
@@ -206,7 +209,7 @@ function layoutInView(figure, traces) {
   return own;
 }
 
-function inCycles(text, curve) { return `${text.replace(/\s*(ω|<i>ω).*$/, "")} (${curve ? cyclesOf(curve) : "cycles per unit time"})`.trim(); }
+function inCycles(text, curve) { return `${text.replace(/\s*(ω|<i>ω).*$/, "")} (${cyclesOf(curve)})`.trim(); }
 
 function quantityTitle(figure, curve) {
   const force = forceOf(view.quantity), unit = unitOf(curve);
@@ -218,8 +221,9 @@ function quantityTitle(figure, curve) {
 // The range of what is drawn, with a margin; null where logarithms do not exist of all of it.
 function rangeOf(traces, letter, log, fromZero) {
   let low = Infinity, high = -Infinity;
-  for (const trace of traces) {
-    if (trace.visible === false || !trace.meta || trace.meta.curve === undefined) { continue; }
+  const shownOnes = traces.filter((trace) => trace.visible !== false && trace[letter]);
+  const own = shownOnes.filter((trace) => trace.meta?.curve !== undefined);
+  for (const trace of own.length ? own : shownOnes) {
     for (const value of trace[letter]) {
       if (value === null || Number.isNaN(value) || (log && value === 0)) { continue; }
       low = Math.min(low, value);
@@ -282,7 +286,7 @@ const selectors = {};
 
 function startView() {
   const bar = document.getElementById("view");
-  if (!bar || !curves.length) { return; }
+  if (!bar || (!curves.length && frequencies.rad === undefined)) { return; }
   const labels = [...new Set(curves.flatMap((curve) => curve.signals.map((one) => one.label)))];
   const forces = [...new Set(curves.flatMap((curve) => (curve.points.peaks ? curve.elements : [])))];
   const moved = curves.some((curve) => curve.points.motion);
@@ -302,9 +306,10 @@ function startView() {
     selectors.harmonic = choiceOf("k =", multiples, "1", (k) => changed({ harmonic: Number(k) }));
     bar.append(selectors.quantity.whole, selectors.harmonic.whole);
   }
-  const rad = first.units.omega || "rad per unit time";
+  const rad = first?.units.omega || frequencies.rad || "rad per unit time";
   selectors.cycles = choiceOf("frequency in", [["", rad], ["cycles", cyclesOf(first)]], "", (unit) => changed({ cycles: unit !== "" }));
-  bar.append(selectors.cycles.whole, checkOf("log x", (logx) => changed({ logx })), checkOf("log y", (logy) => changed({ logy })));
+  if (frequencies.rad !== undefined) { bar.append(selectors.cycles.whole); }
+  bar.append(checkOf("log x", (logx) => changed({ logx })), checkOf("log y", (logy) => changed({ logy })));
   bar.hidden = false;
   showSelectors();
 }
