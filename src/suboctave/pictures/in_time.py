@@ -338,7 +338,7 @@ def plot_lyapunov_map(chart: xarray.Dataset, *, lines: Sequence[tuple[str, np.nd
     for name, x, y in lines:
         frame.add(Polyline(np.array([x, y]), Pen(_LINES[known.index(name) % len(_LINES)])), name)
     axes = (
-        Axis(_frequency_axis(chart), *across[[0, -1]], shows="omega"),
+        Axis(_frequency_axis(chart), float(across[0]), float(across[-1]), shows="omega"),
         Axis(plain(chart.attrs["varied"]), *upwards[[0, -1]]),
     )
     return frame, axes
