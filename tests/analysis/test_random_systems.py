@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib.util
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -17,6 +18,11 @@ import pytest
 from slow import slow
 
 import suboctave as so
+from suboctave.continuation.linear import distance
+from suboctave.continuation.newton import NewtonOptions
+from suboctave.curves.events.monitors import NEIMARK_SACKER, locate
+from suboctave.curves.sample import Sample
+from suboctave.curves.starts import make_curve, start_point
 from suboctave.curves.trace import Unsettled, joined
 
 
@@ -208,3 +214,19 @@ def test_a_generalised_doubling_of_exact_stops_says_how_far_it_may_be_off(system
         share = item.parameter("F") / amplitude
         assert max(abs(share - value) for value in values) < 3.0 * item.uncertainty / amplitude
         assert 1e-6 < item.uncertainty / amplitude < 1e-3
+
+
+def test_where_a_step_ends_on_the_circle_the_crossing_inside_it_comes_before_that_beyond(systems: ModuleType) -> None:
+    # the judge has a pair leave at 0.842229 and come back at 0.838255; seven harmonics have it back at 0.838233, within
+    # what an end that leaves it open which side it is on lets a solution lie beyond
+    answer = judged(systems, 64)
+    places = [event["omega"] for event in answer["events"] if 0.83 < event["omega"] < 0.85]
+    np.testing.assert_allclose(places, [0.842229, 0.838255], atol=1e-6)
+    first, last = answer["system"]["omega"]
+    curve = make_curve(systems.system_of(answer["system"]), "omega", 0.8446, first - last, 7, 1, None)
+    begin, end = (start_point(curve, value, None, NewtonOptions()).turned for value in (0.844616, 0.8382808))
+    end = replace(end, arclength=distance(begin.u, end.u, end.weights))
+    found = locate(NEIMARK_SACKER, Sample(begin), Sample(end), NewtonOptions())
+    assert found is not None
+    assert found.solution is not None
+    assert abs(found.solution.state.omega - places[0]) < 1e-4

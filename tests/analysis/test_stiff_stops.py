@@ -4,10 +4,13 @@ within what is stated, or said to be open.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import suboctave as so
+from suboctave.curves.events.layer import jumps
 from suboctave.timedomain import locate_by_shooting, shoot
 
 
@@ -64,6 +67,26 @@ def test_at_a_given_number_of_harmonics_what_they_do_not_resolve_is_open():
     assert not curve.stable[vague].any()
     assert f"{np.count_nonzero(curve.open)} not settled" in repr(curve)
     assert any("multipliers are not resolved" in u.reason for u in curve.audit.unsettled)
+
+
+def test_several_jumps_at_one_grazing_are_one_or_none():
+    # behind a grazing a test function changes like a square root: it comes to zero once, or not at all
+    curve = so.frequency_response(stop(1e5, 0.8, 0.1, 0.3), (0.7955, 0.7965), harmonics=63)
+    (item,) = curve.bifurcations
+    assert item.kind == "PD"
+    assert item.discontinuous
+    other = replace(item, uncertainty=item.uncertainty + 1e-6, arclength=item.arclength + 1e-6)
+    (one,), back = jumps([item, other], curve.points)
+    assert not back
+    assert one.omega == item.omega
+    assert one.uncertainty >= item.uncertainty
+    # the same two between motions that are all stable lead there and back
+    stable = [point for point in curve.points if point.floquet.unstable == 0]
+    behind = [replace(point, arclength=item.arclength + 1.0) for point in stable]
+    assert jumps([item, other], [*stable, *behind]) == ([], [[item, other]])
+    # beside another grazing it is another one
+    elsewhere = replace(other, contact=replace(other.contact, gap=-0.8))
+    assert jumps([item, elsewhere], curve.points) == ([item, elsewhere], [])
 
 
 @pytest.mark.slow

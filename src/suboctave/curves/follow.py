@@ -22,7 +22,7 @@ from suboctave.continuation.problem import Curve
 from suboctave.curves.corners import beyond_corner
 from suboctave.curves.driver import Driver
 from suboctave.curves.events.grazings import locate_grazings
-from suboctave.curves.events.layer import behind_their_grazings
+from suboctave.curves.events.layer import behind_their_grazings, jumps
 from suboctave.curves.events.monitors import (
     BRANCH_POINT,
     PERIOD_DOUBLING,
@@ -41,7 +41,7 @@ from suboctave.curves.ledgers import REASON, CountCheck, DoublingWatch, HiddenDo
 from suboctave.curves.motion import CRITICAL, MotionEvaluation, MotionProblem
 from suboctave.curves.refine import bifurcation_at, solved_bifurcation, solved_in, turns_at
 from suboctave.curves.sample import Sample
-from suboctave.curves.trace import Settings, Trace, joined
+from suboctave.curves.trace import Settings, Trace, Unsettled, joined
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.truncation import next_harmonics
 from suboctave.interruption import stopping, users_function
@@ -162,10 +162,20 @@ class _Follower(Driver):
     def _finish(self) -> None:
         for p, q, reason in self._watch.missed() if self._watch is not None else ():
             self._guard.doubt(p, q, reason)
+        self._jumps()
         audit = self._guard.audit
         self.trace.audit = replace(audit, unsettled=tuple(joined(audit.unsettled)))
         if self._turned is not None and self.settings.half:
             self.trace.end_at(self._turned)
+
+    def _jumps(self) -> None:
+        """List each jump of a multiplier at a grazing once; what jumps there and back is in doubt."""
+        self.trace.bifurcations, back = jumps(self.trace.bifurcations, self.trace.points)
+        for first, *_, last in back:
+            reason = "a multiplier may pass " + ("+1" if first.kind == "LP" else "-1") + " and come back"
+            name, way = first.parameter_name, (first.arclength, last.arclength)
+            doubt = Unsettled(name, first.parameter(name), last.parameter(name), way, reason)
+            self._guard.audit = self._guard.audit.in_doubt(doubt)
 
     def _sample(self, point: CurvePoint) -> Sample:
         known = self._candidate

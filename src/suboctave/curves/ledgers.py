@@ -62,11 +62,15 @@ class CountCheck:
         # a branch that turns back at a pitchfork is its own mirror image behind it: the count does not change there
         if change <= odd + 2 * kinds.count("NS") and ("BP" in kinds or (change - odd) % 2 == 0):
             return None
-        located = ", ".join(kinds) or "none"
+        located = ", ".join(kinds)
         reason = (
-            f"the number of unstable multipliers changes from {before} to {now}, which the bifurcations located there "
-            f"({located}) do not explain"
+            f"the number of unstable multipliers changes from {before} to {now}, which no bifurcation there explains"
         )
+        if kinds:
+            reason = (
+                f"the number of unstable multipliers changes from {before} to {now}, which the bifurcations located "
+                f"there ({located}) do not explain"
+            )
         if change == 0:
             reason = (
                 f"as many multipliers are unstable behind as before ({now}), although each of the bifurcations located "

@@ -21,7 +21,8 @@ to whoever follows the curve, and called so (`Bifurcation.discontinuous`).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from bisect import insort
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
@@ -36,7 +37,9 @@ from suboctave.curves.events.grazings import Grazing, Touch
 from suboctave.curves.events.locate import NEWTON, Guess, Singular
 from suboctave.curves.events.monitors import BifurcationKind
 from suboctave.curves.motion import MotionEvaluation
+from suboctave.curves.trace import BranchPoint
 from suboctave.errors import ConvergenceError
+from suboctave.floquet.result import FloquetResult
 from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.truncation import motion_size
@@ -53,6 +56,10 @@ _REACH = 0.01
 _BRACKETED = 1e-3
 #: ways behind the grazing at which Newton's method starts, the last four for layers as thin as rounding
 _STARTS = (1e-10, 1e-8, 1e-6, 1e-4, 1e-11, 3e-11, 5e-11, 2e-10)
+#: the multiplier that jumps across the unit circle
+_CRITICAL = {"LP": 1.0, "PD": -1.0}
+#: distance of the places of one grazing, relative
+_ONE = 1e-7
 
 
 def layer_of(kind: BifurcationKind, solution: Singular, guess: Guess) -> GrazingContact | None:
@@ -152,6 +159,82 @@ def behind_their_grazings(located: list[tuple[float, Bifurcation]]) -> list[Bifu
                 fraction, item = at + side * 1e-12, replace(item, arclength=grazing.arclength)
         result.append((fraction, item))
     return [item for _, item in sorted(result, key=lambda pair: pair[0])]
+
+
+def jumps(items: list[Bifurcation], points: Sequence[BranchPoint]) -> tuple[list[Bifurcation], list[list[Bifurcation]]]:
+    """The bifurcations of a curve with each jump at a grazing once, and what cannot be told: jumps there and back.
+
+    Along the square root of one layer a test function comes to zero once at most. Of several discontinuous bifurcations
+    of a kind at one grazing the harmonics make all but one, and that one only where the test changes its sign from one
+    side of what they leave uncertain to the other. It reaches as far as the others do.
+    """
+    kept, back = list(items), []
+    for run in _at_one_grazing(items):
+        kept = [item for item in kept if all(item is not other for other in run)]
+        sides = [_side(run[0].kind, point.floquet) for point in _around(run, kept, points)]
+        if len(sides) == 2 and sides[0] == sides[1]:
+            back.append(run)
+            continue
+        best = min(run, key=lambda item: item.uncertainty)
+        name = best.parameter_name
+        reach = max(abs(item.parameter(name) - best.parameter(name)) for item in run)
+        insort(kept, replace(best, uncertainty=max(best.uncertainty, reach)), key=lambda item: item.arclength)
+    return kept, back
+
+
+def _around(run: list[Bifurcation], others: list[Bifurcation], points: Sequence[BranchPoint]) -> list[BranchPoint]:
+    """The last settled point before some bifurcations and the first behind them, up to the next of their kind: those
+    beyond what they leave uncertain, where there are such.
+    """
+    name, kind = run[0].parameter_name, run[0].kind
+    ends = run[0].arclength, run[-1].arclength
+    before = max(
+        (item.arclength for item in others if item.kind == kind and item.arclength < ends[0]), default=-math.inf
+    )
+    behind = min(
+        (item.arclength for item in others if item.kind == kind and item.arclength > ends[1]), default=math.inf
+    )
+    settled = [point for point in points if point.floquet.decided]
+    result = []
+    for side in (
+        [point for point in reversed(settled) if before < point.arclength < ends[0]],
+        [point for point in settled if ends[1] < point.arclength < behind],
+    ):
+        clear = (
+            p for p in side if all(abs(p.parameter(name) - item.parameter(name)) > item.uncertainty for item in run)
+        )
+        result += [next(clear, side[0])] if side else []
+    return result
+
+
+def _at_one_grazing(items: list[Bifurcation]) -> Iterator[list[Bifurcation]]:
+    """Two and more discontinuous bifurcations of a kind, one after the other, that one grazing brings about."""
+    run: list[Bifurcation] = []
+    for item in (item for item in items if item.kind not in CONTACT_KINDS):
+        if run and _one_jump(run[-1], item):
+            run.append(item)
+            continue
+        if len(run) > 1:
+            yield run
+        run = [item]
+    if len(run) > 1:
+        yield run
+
+
+def _one_jump(a: Bifurcation, b: Bifurcation) -> bool:
+    if a.kind != b.kind or a.kind not in _CRITICAL or not (a.discontinuous and b.discontinuous):
+        return False
+    one, other, name = a.contact, b.contact, a.parameter_name
+    assert one is not None
+    assert other is not None
+    apart = max(abs(one.parameter - other.parameter), abs(a.parameter(name) - b.parameter(name)))
+    same = (one.element, one.gap) == (other.element, other.gap)
+    return same and apart <= a.uncertainty + b.uncertainty + _ONE * abs(one.parameter)
+
+
+def _side(kind: str, floquet: FloquetResult) -> bool:
+    """On which side of a bifurcation of a kind a motion lies."""
+    return bool(np.prod(floquet.multipliers - _CRITICAL[kind]).real > 0.0)
 
 
 def _beside(guess: Guess, limit: float) -> list[tuple[Touch, Grazing, float]]:

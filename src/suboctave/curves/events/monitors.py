@@ -435,7 +435,11 @@ def _located(
     low, high = 0.0, 1.0
     at_low, at_high = a, b
     before, behind = (_BEFORE if kind.counted and not end.floquet.decided else _SLACK for end in (a, b))
+    # one beyond an end that leaves it open may be another one, which leads back: what lies inside comes first
+    beyond: Located | None = None
     for depth in range(bisections):
+        if beyond is not None and (high <= before or low >= 1.0 - behind):
+            return beyond
         share = kind.fraction(at_low, at_high)
         nearer = at_low if share < 0.5 else at_high
         if depth % 3 == 0:
@@ -446,7 +450,10 @@ def _located(
             if attempt is not None:
                 place = low + attempt[1] * (high - low)
                 if -(_BEFORE if begins else before) <= place <= 1.0 + behind:
-                    return Located(kind, min(1.0, max(place, 0.0)), nearer, attempt[0], 0.0)
+                    found = Located(kind, min(1.0, max(place, 0.0)), nearer, attempt[0], 0.0)
+                    if begins or -_SLACK <= place <= 1.0 + _SLACK:
+                        return found
+                    beyond = beyond or found
         middle = None
         for part in (0.5, 0.4, 0.65):
             try:
@@ -462,7 +469,9 @@ def _located(
         elif kind.changed(middle, at_high):
             low, at_low = at, middle
         else:
-            return None
+            return beyond
+    if beyond is not None:
+        return beyond
     names = abs(at_high.point.parameter - at_low.point.parameter)
     return Located(kind, 0.5 * (low + high), at_high, None, 0.5 * names, (at_low, at_high))
 
