@@ -9,7 +9,15 @@ import pytest
 
 from suboctave import interruption
 from suboctave.errors import InputError, TimeLimitError
-from suboctave.interruption import Interruption, TimeLimitReached, check_time, limited, pass_on, time_limit
+from suboctave.interruption import (
+    Interruption,
+    TimeLimitReached,
+    check_time,
+    limited,
+    pass_on,
+    time_limit,
+    time_to_wait,
+)
 
 
 @pytest.fixture
@@ -36,6 +44,19 @@ def test_the_limit_is_raised_once_as_ctrl_c_is(clock):
     assert isinstance(reached.value, KeyboardInterrupt)
     assert Interruption.of(reached.value) == Interruption(2.0)
     check_time()
+
+
+def test_nobody_waits_beyond_a_limit(clock):
+    assert time_to_wait(0.2) == 0.2
+    with time_limit(2.0):
+        assert time_to_wait(0.2) == 0.2
+        clock.now += 1.95
+        assert time_to_wait(0.2) == pytest.approx(0.05)
+        clock.now += 0.1
+        assert time_to_wait(0.2) == 0.0
+        with pytest.raises(TimeLimitReached):
+            check_time()
+        assert time_to_wait(0.2) == 0.2  # what finishes a result is not hurried
 
 
 def test_of_two_limits_the_nearer_one_counts(clock):

@@ -95,6 +95,14 @@ def check_time() -> None:
         raise TimeLimitReached(deadline.seconds)
 
 
+def time_to_wait(seconds: float) -> float:
+    """So many seconds, or fewer where the time limit that holds here is over earlier."""
+    deadline = _DEADLINE.get()
+    if deadline is None or deadline.reached:
+        return seconds
+    return min(seconds, max(deadline.until - monotonic(), 0.0))
+
+
 def check_seconds(seconds: Any) -> float | None:
     """A time limit in seconds, None for none; InputError for what is no positive number."""
     if seconds is None:

@@ -30,12 +30,12 @@ from dataclasses import dataclass
 from typing import Any, BinaryIO
 
 from suboctave.errors import InputError, SuboctaveError, shortened
-from suboctave.interruption import check_time
+from suboctave.interruption import check_time, time_to_wait
 from suboctave.version import __version__
 
 #: how often a task is begun before it is given up, where the process that computes it dies every time
 TRIES = 3
-#: seconds between looks at the clock and at Ctrl-C while tasks are computed
+#: seconds between looks at Ctrl-C, at most, while tasks are computed
 _LOOK = 0.2
 #: seconds that a process waits for its next task
 _WAITS = 60.0
@@ -138,7 +138,7 @@ def _on_processes(function: Function, tasks: Sequence[Any], workers: int) -> Ite
             while True:
                 check_time()
                 with suppress(queue.Empty):
-                    number, result, error = answers.get(timeout=_LOOK)
+                    number, result, error = answers.get(timeout=time_to_wait(_LOOK))
                     break
             if error is not None:
                 raise error
@@ -395,7 +395,7 @@ def _on_cluster(function: Function, tasks: Sequence[Any], address: str) -> Itera
                 while True:
                     check_time()
                     with suppress(queue.Empty):
-                        future = done.get(timeout=_LOOK)
+                        future = done.get(timeout=time_to_wait(_LOOK))
                         break
                 failure = future.exception()
                 if isinstance(failure, distributed.KilledWorker):
