@@ -7,6 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import suboctave as so
+from suboctave.floquet.result import FloquetResult
 
 ZETA, F = 0.02, 0.3
 
@@ -112,6 +113,18 @@ def test_equilibria_and_cycles():
     assert_allclose(cycle.amplitude, 0.2, rtol=1e-3)
     assert cycle.stable
     assert cycle.orbit.stable  # in spite of the multiplier +1
+
+
+def test_motions_of_a_conservative_mode_are_stable_within_their_errors():
+    """Its multipliers lie on the circle, where rounding puts them to either side."""
+    duffing = so.System([[1.0]], [[0.0]], [[1.0]], [so.CubicSpring(0, 1.0)])
+    mode = so.nonlinear_mode(duffing, mode=1, amplitude=0.5, harmonics=5, damped=False)
+    assert all(point.orbit.stable for point in mode[::8])
+    pair = 1.00001 * np.exp([1.0j, -1.0j])
+    beside = np.array([1.0, 1.0, *pair, *(1.0 / pair)])
+    others = np.arange(6) > 1
+    for error, inside in ((1e-4, True), (1e-7, False), (2.0, False)):
+        assert FloquetResult(beside, np.full(6, error)).inside(others) is inside
 
 
 def test_what_is_asked_of_a_motion(folded):

@@ -120,6 +120,14 @@ class FloquetResult:
         """True if all multipliers lie inside the unit circle."""
         return self.margin < 0.0
 
+    def inside(self, deciding: NDArray[np.bool_]) -> bool:
+        """Whether the multipliers that decide lie inside the unit circle, of a conservative motion not outside of it by
+        more than their errors; not where their errors are too large for a verdict.
+        """
+        mu, errors = self.multipliers[deciding], self.errors[deciding]
+        within = np.abs(mu) <= 1.0 + errors if self.undamped else np.abs(mu) < 1.0
+        return bool(within.all()) and not no_verdict(mu, errors).any()
+
     @property
     def decided(self) -> bool:
         """True if no multiplier is closer to the unit circle than its error estimate."""

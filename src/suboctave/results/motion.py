@@ -7,27 +7,29 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.continuation.linear import one_thread
 from suboctave.errors import GivenDof, InputError, chosen_dof
 from suboctave.floquet.methods import method_of
 from suboctave.floquet.result import FloquetResult
+from suboctave.harmonic.basis import Array
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.model.inputs import check_count
 
 if TYPE_CHECKING:
     import pandas
 
-#: growth over a period that is none, where rounding leaves multipliers of a conservative motion off the unit circle
-_ON_CIRCLE = 1e-4
+#: damping ratio up to which a mode is conservative: what Newton's tolerance leaves of it
+_UNDAMPED = 1e-9
 #: share of the largest component that is rounding
 _ROUNDING = 1e-14
 
 
 def floquet_of(orbit: PeriodicOrbit) -> FloquetResult:
     """Multipliers of a motion, as `suboctave.stability` gives them by default."""
-    if orbit.zeta:
+    if abs(orbit.zeta) > _UNDAMPED:
         raise InputError(
             "a damped mode is a motion that only its fictitious damping keeps going: it has no multipliers of its own; "
             "ask the curve, curve.stable"
@@ -41,8 +43,7 @@ def stable(motion: Any) -> bool:
     if isinstance(motion, Bifurcation):
         mu, critical = motion.multipliers, motion.critical_multiplier()
         distance = np.minimum(np.abs(mu - critical), np.abs(mu - np.conj(critical)))
-        others = np.argsort(distance, kind="stable")[1 if abs(critical.imag) < 1e-6 * abs(critical) else 2 :]
-        return bool(np.all(np.abs(mu[others]) < 1.0))
+        return motion.floquet.inside(_but(distance, 1 if abs(critical.imag) < 1e-6 * abs(critical) else 2))
     curve = getattr(motion, "curve", None)
     if curve is not None:
         return bool(curve.stable_at(motion))
@@ -51,10 +52,14 @@ def stable(motion: Any) -> bool:
     if orbit.system.driven or not np.any(orbit.x[1:]):
         return result.stable and not result.vague
     # of what nothing drives one multiplier is +1 by itself, of a conservative motion two
-    own = 2 if result.undamped else 1
-    others = np.argsort(np.abs(result.multipliers - 1.0), kind="stable")[own:]
-    room = _ON_CIRCLE if own == 2 else 0.0
-    return bool(np.all(np.abs(result.multipliers[others]) < 1.0 + room))
+    return result.inside(_but(np.abs(result.multipliers - 1.0), 2 if result.undamped else 1))
+
+
+def _but(distance: Array, count: int) -> NDArray[np.bool_]:
+    """All but so many of the nearest ones."""
+    others = np.ones(len(distance), dtype=bool)
+    others[np.argsort(distance, kind="stable")[:count]] = False
+    return others
 
 
 def plot(motion: Any, path: Any, options: Mapping[str, Any]) -> Any:
