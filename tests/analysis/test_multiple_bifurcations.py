@@ -156,10 +156,11 @@ def test_followed_in_a_second_parameter(in_phase):
     event = in_phase.bifurcations["BP"][0]
     curve = so.track(event, "p", (0.08, 0.13))
     assert "codimension two" in " ".join(curve.warnings)
-    point = curve.points[-1]
-    again = so.frequency_response(duffing(3, -0.02, point.orbit.values["p"]), (0.9, 2.0)).bifurcations["BP"][0]
-    assert point.orbit.omega == pytest.approx(again.omega, rel=1e-9)
-    assert np.sort(np.abs(point.floquet.multipliers - 1.0))[1] < 1e-6
+    (between,) = curve.at(p=0.11)
+    again = so.frequency_response(duffing(3, -0.02, 0.11), (0.9, 2.0)).bifurcations["BP"][0]
+    assert between.omega == pytest.approx(again.omega, rel=1e-9)
+    for point in (between, curve.points[-1]):
+        assert np.sort(np.abs(point.floquet.multipliers - 1.0))[1] < 1e-6
 
 
 def test_sensitivity(in_phase):

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 import suboctave as so
 from suboctave.floquet.result import FloquetResult
+from suboctave.results.branch import Branch
 
 ZETA, F = 0.02, 0.3
 
@@ -100,6 +103,18 @@ def test_the_peak_of_a_nonlinear_response_is_that_of_its_ridge(duffing, folded):
     (there,) = ridge.at(f=F)
     peak = folded.peaks().highest
     assert_allclose([peak.omega, peak.height], [there.omega, there.amplitude], rtol=1e-8)
+
+
+def test_the_seam_of_a_closed_curve_is_one_point(folded):
+    """A curve that runs forth and back: its first motion is its last."""
+    there = folded.points[:12]
+    whole = there[-1].arclength
+    back = [replace(point, arclength=2.0 * whole - point.arclength) for point in reversed(there[:-1])]
+    loop = Branch(folded.system, "omega", [*there, *back], [], [], True, folded.endings, 0, folded.options)
+    first, inside = float(loop.omega[0]), 0.5 * float(loop.omega[4] + loop.omega[5])
+    assert loop.at(omega=first).omega.tolist() == [first]
+    assert loop.at(omega=inside).omega.tolist() == [inside, inside]
+    assert len(loop.at(omega=float(loop.omega[3]))) == 2
 
 
 def test_equilibria_and_cycles():

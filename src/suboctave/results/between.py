@@ -166,9 +166,13 @@ class Between:
         nodes, found = self.nodes, []
         off = np.array([value_of(node.orbit, name) - value for node in nodes])
         off[np.abs(off) <= _SAME * max(abs(value), self._span(name))] = 0.0
+        # the first point of a closed curve comes after the last one, which is the same
+        before = np.concatenate([off[-1:] if self.curve.closed else [math.inf], off[:-1]])
+        if not off.any():
+            before[0] = math.inf
         with one_thread():
             for i, node in enumerate(nodes):
-                if off[i] == 0.0 and not (i and off[i - 1] == 0.0):
+                if off[i] == 0.0 and before[i] != 0.0:
                     known = isinstance(node.item, BranchPoint)
                     found.append(node.item if known else self.as_branch_point(self.point_at(node)))
                 if i + 1 < len(nodes) and off[i] * off[i + 1] < 0.0:
