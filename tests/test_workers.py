@@ -123,6 +123,15 @@ list(workers.completed(work, [0, 1], 2))
 """
 
 
+def test_a_process_that_has_waited_long_enough_ends_without_a_word():
+    code = "from suboctave import workers; workers._WAITS = 0.01; workers.main()"
+    with subprocess.Popen(
+        [sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as process:
+        assert process.wait(30.0) == 0
+        assert process.stdout.read() + process.stderr.read() == b""
+
+
 def test_processes_end_with_the_one_that_started_them():
     """Also where that is killed, in the middle of a task. The script has no `__main__` guard."""
     with subprocess.Popen([sys.executable, "-c", CODE], stderr=subprocess.PIPE, text=True) as process:

@@ -27,7 +27,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, NoReturn
 
 from suboctave.errors import InputError, SuboctaveError, shortened
 from suboctave.interruption import check_time, time_to_wait
@@ -308,7 +308,7 @@ def _receive(stream: Any) -> tuple[bytes, bytes]:
     return head[:1], block
 
 
-def main() -> None:
+def main() -> NoReturn:
     """What such a process runs: a function, and task after task for it, from standard input."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that hands out tasks
     given, answers = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
@@ -336,6 +336,9 @@ def main() -> None:
                     failure = InputError(f"what is to be computed cannot be loaded by a worker: {words}")
             if kind == _TASK:
                 _send(answers, _ANSWER, _packed(result, failure))
+    # an ordinary end of the interpreter waits in vain for the thread that listens
+    sys.stderr.flush()
+    os._exit(0)
 
 
 def _own_modules() -> bool:

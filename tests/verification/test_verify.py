@@ -10,6 +10,7 @@ import pytest
 import suboctave as so
 from suboctave.errors import ConvergenceError
 from suboctave.verification import motions
+from suboctave.verification.harmonics import left_out
 from suboctave.verification.motions import pairing
 
 
@@ -123,3 +124,13 @@ def test_where_the_search_loses_a_branch_point_multipliers_that_cross_beside_it_
     assert "sees multipliers cross as at branch point" in check.reason
     # at a limit point there are no motions on one side
     assert not so.verify(duffing_curve.bifurcations["LP"][0]).agrees
+
+
+def test_right_behind_a_grazing_few_harmonics_are_no_other_motion():
+    # what they leave out moves those that are kept as well: shooting is 1.8e-3 away
+    system = so.System(1.0, 0.05, 1.0, [so.ElasticStop(0, 50.0, 0.5)], [so.HarmonicLoad(0, 0.3)])
+    before = so.frequency_response(system, (0.63, 0.633)).orbits[-1]
+    motion = so.frequency_response(system, (0.633316, 0.633317), harmonics=9, start=before).orbits[0]
+    found = so.verify(motion)
+    assert found.outcome == "cannot tell"
+    assert 1e-3 < found.distance <= left_out(motion) < 2.0 * found.distance

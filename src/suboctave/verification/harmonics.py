@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
 
 from suboctave.harmonic.basis import to_complex
@@ -10,13 +12,24 @@ from suboctave.harmonic.orbit import PeriodicOrbit
 
 def left_out(motion: PeriodicOrbit) -> float:
     """How far the neglected harmonics may move a state of the motion, relative to the largest displacement and velocity
-    of the unknowns: sums of their moduli, to first order.
+    of the unknowns: sums of the moduli of what one step of Newton's method with twice as many harmonics changes.
     """
-    wide, completed = motion.state().completed_x
-    waves = np.abs(to_complex(completed))
-    speeds = waves * wide.multiples[:, None]
-    kept = motion.basis.harmonics + 1
-    shares = [part[kept:].sum(axis=0) / max(part[:kept].max(), np.finfo(float).tiny) for part in (waves, speeds)]
+    state = motion.state()
+    finer = state.completed
+    own, change = motion.basis.resized(state.x, finer.basis), finer.x
+    # what nothing drives may begin at any time, and the equations are singular
+    if motion.system.driven:
+        # a motion that does not solve its own equations has other errors than that
+        rest = finer.residual - motion.basis.resized(state.balance.shaped(state.residual), finer.basis).ravel()
+        with suppress(np.linalg.LinAlgError):
+            step = np.asarray(np.linalg.solve(finer.jacobian, rest), dtype=float)
+            change = change - finer.balance.shaped(step)
+    waves, moved = np.abs(to_complex(own)), np.abs(to_complex(change - own))
+    speeds = finer.basis.multiples[:, None]
+    shares = [
+        (moved * factor).sum(axis=0) / max(float((waves * factor).max()), np.finfo(float).tiny)
+        for factor in (np.ones_like(speeds), speeds)
+    ]
     return float(np.max(shares))
 
 
