@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from suboctave.errors import InputError, shortened, suggest
@@ -90,6 +90,11 @@ class UnitSystem:
     def __str__(self) -> str:
         # a force without a name of its own is that of its mass
         return ", ".join((self.length, self.force if self.force in _MEANS else self.mass, self.time))
+
+    @property
+    def angular(self) -> UnitSystem:
+        """The same for a degree of freedom that is an angle: rad in the place of the length."""
+        return replace(self, length="rad")
 
     @property
     def frequency(self) -> str:

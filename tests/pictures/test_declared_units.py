@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 import suboctave as so
@@ -63,3 +64,39 @@ def test_in_tables_of_the_terminal(curve, capsys):
     assert head.split()[:7] == ["kind", "omega", "(rad/s)", "Hz", "max", "|x|", "(mm)"]
     omega, hertz = map(float, line.split()[1:3])
     assert hertz == pytest.approx(omega / 6.283185307179586, rel=1e-6)
+
+
+@pytest.fixture(scope="module")
+def beam():
+    """A node that is displaced and turns."""
+    matrices = np.eye(2), 0.1 * np.eye(2), [[2.0, -1.0], [-1.0, 2.0]]
+    load = so.HarmonicLoad(0, 0.1)
+    return so.System(*matrices, so.CubicSpring(0, 0.2), load, dof_names=["7 y", "7 rz"], units="mm, N, s")
+
+
+def test_of_rotations_are_in_rad(beam, tmp_path):
+    """On axes, in tables and in heads, of declared angles and of the rotations of structures."""
+    turning = so.frequency_response(beam, (0.9, 1.0), harmonics=3, observe="7 rz")
+    assert texts(so.plot(turning))[1].endswith("(rad)")
+    assert texts(so.plot(turning, quantity="velocity"))[1].endswith("(rad/s)")
+    assert texts(so.plot(turning, dof=0))[1].endswith("(mm)")
+    assert "amplitude (rad)" in repr(turning.at(omega=0.95))
+    assert "amplitude (rad)" in turning.to_csv(tmp_path / "turning.csv").read_text()
+    page = so.write_report({"turning": turning}, tmp_path / "page.html").read_text(encoding="utf-8")
+    assert '"dof":1,"length":"rad"' in page
+    pendulum = so.System.from_equations("x'' + 0.1*x' + sin(x) = 0.1*cos(omega*t)", angles=["x"], units="m, N, s")
+    assert pendulum.units_of(0).name("length / time") == "rad/s"
+
+
+def test_in_heads_of_results_in_time(beam, tmp_path):
+    def head(result):
+        return result.to_csv(tmp_path / "table.csv", overwrite=True).read_text(encoding="utf-8").splitlines()[0]
+
+    times = {"transient": 2, "periods": 4}
+    assert head(so.integrate(beam, 1.0, periods=1)) == "time (s),x_0 (mm),x_1 (rad),v_0 (mm/s),v_1 (rad/s)"
+    assert head(so.lyapunov_exponents(beam, 1.0, **times)).startswith("exponent (1/s),standard_error (1/s)")
+    swept = so.brute_force_diagram(beam, (0.5, 0.6), values=2, **times)
+    assert head(swept).startswith("omega (rad/s),frequency (Hz),start,kind,period,amplitude (mm)")
+    assert head(swept.to_table()) == head(swept)
+    stepped = head(so.stepped_sine(beam, (0.5, 0.6), values=2, **times))
+    assert "amplitude (mm),phase_deg (°),harmonic_0 (mm)" in stepped

@@ -43,6 +43,7 @@ from suboctave.model.system import System
 from suboctave.options import ParallelOptions, RunOptions
 from suboctave.pictures.cells import Pictured
 from suboctave.projection import in_basis, small_system
+from suboctave.store.layout import rotations_of, with_units
 from suboctave.store.plain import Recorded, flat, recorded, written_system
 from suboctave.store.registry import Codec, Datasets, Stored, register
 from suboctave.store.table import Table, write_csv
@@ -376,6 +377,8 @@ class TimeResult(Stored, Pictured):
 
     contents: ClassVar[str]
     picture: ClassVar[str]
+    #: columns of its table that are no states and no quantities of motions, by their dimensions
+    dimensions: ClassVar[Mapping[str, str]] = {}
     in_record: ClassVar[Mapping[str, type]] = {}
     system: System
     #: what a large structure was integrated as, None for one that was taken as it is
@@ -443,7 +446,9 @@ class TimeResult(Stored, Pictured):
 
     def to_csv(self, path: str | Path, overwrite: bool = False) -> Path:
         """The table as comma-separated text (.csv)."""
-        return write_csv(self.to_dataframe(), path, overwrite)
+        return write_csv(
+            with_units(self.to_dataframe(), getattr(self, "system", None), dimensions=self.dimensions), path, overwrite
+        )
 
     def to_table(self) -> Table:
         """The table with the result beside it (`.result`)."""
@@ -485,7 +490,7 @@ class TimeResult(Stored, Pictured):
         produced = {"dofs": n, "dof_names": "\n".join(self.system.dof_names)}
         produced |= {"system": self.system.name, "suboctave": __version__}
         if self.system.units:
-            produced["units"] = str(self.system.units)
+            produced |= {"units": str(self.system.units), **rotations_of(self.system)}
         if self.projection is not None:
             produced["projection"] = self.basis
         if projected and self.projection is not None:

@@ -77,6 +77,7 @@ class LyapunovExponents(TimeResult):
     """
 
     contents = "lyapunov exponents"
+    dimensions: ClassVar[Mapping[str, str]] = {"exponent": "1 / time", "standard_error": "1 / time"}
     picture = "plot_lyapunov"
     exponents: Annotated[Array, On("exponent")]
     standard_errors: Annotated[Array, On("exponent")]
@@ -393,6 +394,7 @@ class Separation(TimeResult):
     """
 
     contents = "separation"
+    dimensions: ClassVar[Mapping[str, str]] = {"exponent": "1 / time"}
     picture = "plot_separation"
     in_record: ClassVar[Mapping[str, type]] = {"TwoTrajectories": TwoTrajectories}
     rates: Annotated[Array, On("setting", name="rate")]

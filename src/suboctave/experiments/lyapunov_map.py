@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, Protocol, Unpack, runtime_checkable
+from typing import Annotated, Any, ClassVar, Protocol, Unpack, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,6 +67,7 @@ class LyapunovMap(TimeResult):
     """
 
     contents = "lyapunov map"
+    dimensions: ClassVar[Mapping[str, str]] = {"exponent": "1 / time", "standard_error": "1 / time"}
     picture = "plot_lyapunov_map"
     name: Annotated[str, On(name="varied")]
     omega: Annotated[Array, On("omega")]

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, Unpack
+from typing import Annotated, Any, ClassVar, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -291,6 +291,7 @@ class SteppedSine(TimeResult):
     """
 
     contents = "stepped sine"
+    dimensions: ClassVar[Mapping[str, str]] = {"largest": "length", "phase_deg": "°"}
     picture = "plot_stepped_sine"
     omega: Annotated[Array, On("omega")]
     directions: Annotated[tuple[str, ...], On("direction", name="direction")]

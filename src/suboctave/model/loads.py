@@ -28,7 +28,8 @@ from suboctave.model.expressions.coefficients import ZERO, Coefficient, Number, 
 from suboctave.model.matrices import MatrixCoefficient
 
 #: translations and rotations, the last words of names such as "1042 z"
-DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
+ROTATIONS = ("rx", "ry", "rz")
+DIRECTIONS = ("x", "y", "z", *ROTATIONS)
 #: far above what harmonic balance has unknowns for; angles of higher ones would lose digits in time integration
 _HIGHEST = 10_000
 #: mass, damping, stiffness and structural damping of the structure that a load acts on

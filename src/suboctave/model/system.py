@@ -23,7 +23,7 @@ from suboctave.model.elements.base import Array, BaseElement, with_numbers
 from suboctave.model.elements.smoothness import CornerSampling, PiecewiseLinear, SharpVelocitySampling
 from suboctave.model.expressions.coefficients import Coefficient
 from suboctave.model.expressions.reader import RESERVED
-from suboctave.model.loads import HarmonicLoad, Load, LoadComponent
+from suboctave.model.loads import ROTATIONS, HarmonicLoad, Load, LoadComponent
 from suboctave.model.matrices import MatrixCoefficient, check_damping, check_mass, matrix_coefficient, viscous_damping
 from suboctave.model.modes import modes_of
 from suboctave.units import UnitSystem
@@ -189,6 +189,16 @@ class System:
     def turns(self) -> Turns:
         """The turns of its angles, by which states are compared."""
         return Turns(np.array([angle.turn(self.n) for angle in self.angles]).reshape(-1, self.n))
+
+    @functools.cached_property
+    def rotations(self) -> frozenset[int]:
+        """Degrees of freedom that are angles: those declared, and of structures the rotations, by names as "7 rx"."""
+        named = (i for i, name in enumerate(self.dof_names) if name.split()[-1:] and name.split()[-1] in ROTATIONS)
+        return frozenset([*named, *(dof for angle in self.angles for dof in angle.dofs)])
+
+    def units_of(self, dof: int) -> UnitSystem | None:
+        """The units of what is said of a degree of freedom: rad in the place of the length where it is an angle."""
+        return self.units.angular if self.units is not None and dof in self.rotations else self.units
 
     def with_scaled_loads(self, name: str = "load_scale") -> System:
         """The same system whose oscillating loads are multiplied by a new parameter, 1 to begin with.

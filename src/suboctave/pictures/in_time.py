@@ -28,6 +28,7 @@ from suboctave.pictures.options import (
     frequency_label,
     parts_of_dof,
     shown_multiple,
+    units_of_dof,
 )
 from suboctave.pictures.paper import Layout, picture
 from suboctave.pictures.response import response_frame
@@ -121,7 +122,7 @@ def plot_brute_force(
         _add_motions(frame, diagram.isel(start=known.index(start)), start, dof, quantity == "section", suffix)
     symbol = _symbol_of(diagram, dof, 0).strip("$")
     upwards = rf"$\max\,|{symbol}|$" if quantity == "amplitude" else rf"${symbol}(t_k)$, stroboscopic"
-    upwards = _with_unit(upwards, diagram, 0)
+    upwards = _with_unit(upwards, diagram, 0, dof)
     text, shows = (_frequency_axis(diagram), varied) if varied == "omega" else (plain(varied), "")
     across = Axis(text, low, high, shows=shows)
     return frame, (across, Axis(upwards))
@@ -167,7 +168,7 @@ def plot_stepped_sine(
         marks = Markers(at, Mark("+", 5.0, colour, colour), cut=True, role="measured", layer=4.2)
         frame.add(marks, plain(one.label))
     symbol = f"X_{{{shown_multiple(harmonic)}}}" + ("" if test.attrs["dofs"] == 1 else f"^{{({dof})}}")
-    axes = Axis(_frequency_axis(test), low, high, shows="omega"), Axis(_with_unit(f"$|{symbol}|$", test, 0), 0.0)
+    axes = Axis(_frequency_axis(test), low, high, shows="omega"), Axis(_with_unit(f"$|{symbol}|$", test, 0, dof), 0.0)
     return frame, axes
 
 
@@ -238,7 +239,7 @@ def _name(period: int) -> str:
 
 def symbol_of(dataset: xarray.Dataset, dof: int, order: int) -> str:
     """A displacement, or its first derivative, as an axis says it."""
-    return _with_unit(_symbol_of(dataset, dof, order), dataset, order)
+    return _with_unit(_symbol_of(dataset, dof, order), dataset, order, dof)
 
 
 def _symbol_of(dataset: xarray.Dataset, dof: int, order: int) -> str:
@@ -246,9 +247,9 @@ def _symbol_of(dataset: xarray.Dataset, dof: int, order: int) -> str:
     return rf"$\dot {letter}{index}$" if order else f"${letter}{index}$"
 
 
-def _with_unit(text: str, dataset: xarray.Dataset, order: int) -> str:
+def _with_unit(text: str, dataset: xarray.Dataset, order: int, dof: int) -> str:
     """Behind what an axis says of a displacement or its derivative the unit that the system declares."""
-    declared = declared_units([dataset])
+    declared = units_of_dof([dataset], dof)
     return f"{text} ({declared.name(('length', 'length / time')[order])})" if declared else text
 
 
@@ -394,7 +395,7 @@ def _colours(periods: np.ndarray) -> list[str]:
 def _symbol(basins: xarray.Dataset, plane: str, one: bool) -> str:
     kind, _, dof = str(basins.attrs[plane]).partition("_")
     letter = "x" if kind == "x" else r"\dot x"
-    return _with_unit(f"${letter}(0)$" if one else f"${letter}_{{{dof}}}(0)$", basins, int(kind != "x"))
+    return _with_unit(f"${letter}(0)$" if one else f"${letter}_{{{dof}}}(0)$", basins, int(kind != "x"), int(dof or 0))
 
 
 def _edges(grid: np.ndarray) -> np.ndarray:

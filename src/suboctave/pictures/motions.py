@@ -25,7 +25,7 @@ from suboctave.errors import InputError
 from suboctave.options import with_options
 from suboctave.pictures import style
 from suboctave.pictures.drawing import Axis, Drawing, Entry, Frame, Guide, Markers, Polyline, Ticks, plain
-from suboctave.pictures.options import DERIVATIVES, HistoryOptions, MotionOptions, MotionView, SpectrumOptions
+from suboctave.pictures.options import DERIVATIVES, NO_DOF, HistoryOptions, MotionOptions, MotionView, SpectrumOptions
 from suboctave.pictures.paper import check_path, finished
 from suboctave.pictures.strokes import check_count, differing
 from suboctave.pictures.style import Mark, Pen, curve_styles, period_colour, period_name, period_of, styles_of_periods
@@ -114,7 +114,7 @@ def plot_history(motions: Any, path: str | Path | None = None, **options: Unpack
     text = "time (s)" if view.frequency else r"time in load periods, $t/T$" if in_periods else r"time $\omega_0 t$"
     across = Axis(text, -0.02 * longest, 1.02 * longest, ticks=ticks)
     if view.quantity == "force":
-        named = view.unit_of("force", datasets)
+        named = view.unit_of("force", datasets, NO_DOF)
         upwards = f"force of element {view.element}" + (f" ({named})" if named else "")
     else:
         upwards = view.name(datasets[0], DERIVATIVES[view.quantity])

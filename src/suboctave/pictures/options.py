@@ -186,11 +186,13 @@ class Units:
             return r"frequency ratio $\omega/\omega_0$"
         return frequency_label(declared_units(datasets), self.frequency or "")
 
-    def unit_of(self, dimension: str, datasets: Sequence[xarray.Dataset]) -> str:
-        """The unit of a quantity: the one given, else, where nothing is scaled, that which the systems declare."""
+    def unit_of(self, dimension: str, datasets: Sequence[xarray.Dataset], dof: int | None = None) -> str:
+        """The unit of a quantity, perhaps of a degree of freedom: the one given, else, where nothing is scaled, that
+        which the systems declare.
+        """
         if self.unit is not None or self.scale is not None or self.omega_reference is not None:
             return self.unit or ""
-        declared = declared_units(datasets)
+        declared = units_of_dof(datasets, dof)
         return declared.name(dimension) if declared else ""
 
     def check_time(self, dataset: xarray.Dataset) -> None:
@@ -430,7 +432,8 @@ class Coordinates:
                 text = text.removeprefix("forcing ")
             unit = view.unit if index == self._scaled else None
             if name is None and unit is None:
-                unit = "°" if view.in_degrees else view.unit_of(view.kind.unit, datasets)
+                dof = view.number if view.kind.of_dof else NO_DOF
+                unit = "°" if view.in_degrees else view.unit_of(view.kind.unit, datasets, dof)
             texts.append(text + (f" ({unit})" if unit else ""))
         return tuple(texts)
 
@@ -473,7 +476,7 @@ class MotionView(Units):
         if words:
             text = f"{list(DERIVATIVES)[order]} {text}"
         declared = declared_units([dataset])
-        if unit := self.unit_of("length", [dataset]):
+        if unit := self.unit_of("length", [dataset], int(dataset.attrs["dof"])):
             time = "s" if self.frequency else declared.time if declared else "time"
             per = "" if not order or self.omega_reference is not None else (f"/{time}", f"/{time}²")[order - 1]
             text += f" ({unit}{per})"
@@ -498,6 +501,20 @@ def declared_units(datasets: Sequence[xarray.Dataset]) -> UnitSystem | None:
     """The units that the systems of all datasets declare; None where they differ."""
     texts = {str(dataset.attrs.get("units", "")) for dataset in datasets}
     return UnitSystem.of(texts.pop()) if len(texts) == 1 else None
+
+
+#: what is said of no degree of freedom
+NO_DOF = -1
+
+
+def units_of_dof(datasets: Sequence[xarray.Dataset], dof: int | None = None) -> UnitSystem | None:
+    """The declared units of what is said of a degree of freedom, by default the observed one: of an angle in rad."""
+    declared, angles = declared_units(datasets), set()
+    for dataset in datasets:
+        known = str(dataset.attrs.get("rotations", "")).split("\n")
+        place = dataset.attrs.get("observed_dof", dataset.attrs.get("observed", 0)) if dof is None else dof
+        angles.add(str(int(place)) in known)
+    return declared.angular if declared is not None and angles == {True} else declared
 
 
 def dof_names_of(dataset: xarray.Dataset) -> list[str]:

@@ -16,6 +16,7 @@ import numpy as np
 from suboctave.pictures import style
 from suboctave.pictures.boundary import kind_of, plane_of
 from suboctave.pictures.given import is_boundary
+from suboctave.pictures.options import units_of_dof
 from suboctave.pictures.strokes import number_of
 from suboctave.pictures.style import period_of
 from suboctave.pictures.tables import observed_label
@@ -199,8 +200,8 @@ def _units(dataset: xarray.Dataset) -> dict[str, str]:
     units = UnitSystem.of(str(dataset.attrs.get("units", "")))
     if units is None:
         return {}
-    own = {"omega": units.frequency, "cycles": units.cycles}
-    return own | {name: getattr(units, name) for name in ("length", "force", "time")}
+    own = {"omega": units.frequency, "cycles": units.cycles, "length": (units_of_dof([dataset]) or units).length}
+    return own | {name: getattr(units, name) for name in ("force", "time")}
 
 
 def _signals(dataset: xarray.Dataset) -> dict[str, Any]:
@@ -210,7 +211,9 @@ def _signals(dataset: xarray.Dataset) -> dict[str, Any]:
     if "signal_label" in dataset:
         labels, numbers = (dataset[f"signal_{name}"].to_numpy().tolist() for name in ("label", "dof"))
         elements = [str(label) for label in dataset["element_label"].to_numpy()]
-    signals = [{"label": label, "dof": dof} for label, dof in zip(labels, numbers, strict=True)]
+    lengths = [getattr(units_of_dof([dataset], int(dof)), "length", "") for dof in numbers]
+    given = zip(labels, numbers, lengths, strict=True)
+    signals = [{"label": label, "dof": dof, "length": length} for label, dof, length in given]
     return {"signals": signals, "elements": elements, "left_out": int(dataset.attrs.get("dofs_left_out", 0))}
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from suboctave.pictures import style
 from suboctave.pictures.boundary import kind_of, parameter_of, plane_of
 from suboctave.pictures.given import is_boundary
-from suboctave.pictures.options import dof_names_of
+from suboctave.pictures.options import dof_names_of, units_of_dof
 from suboctave.pictures.strokes import fixed_parameters, number_of, spelt
 from suboctave.pictures.style import period_name, period_of
 from suboctave.store.layout import coordinate, parameter_column
@@ -73,7 +73,8 @@ def bifurcations(dataset: xarray.Dataset) -> Table:
     units, label = UnitSystem.of(str(dataset.attrs.get("units", ""))), observed_label(dataset)
     heads = "ω", f"max |{label}|"
     if units is not None:
-        heads = f"ω ({units.frequency})", f"max |{label}| ({units.length})"
+        own_units = units_of_dof([dataset]) or units
+        heads = f"ω ({units.frequency})", f"max |{label}| ({own_units.length})"
     own, remarks = ("kind", *heads, "multiplier", "residual", "remark"), _remarks(dataset)
     kinds, omega, amplitude, multiplier, residual = (
         dataset[f"event_{name}"].to_numpy() for name in ("kind", "omega", "amplitude", "multiplier", "residual")

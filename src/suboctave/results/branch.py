@@ -59,12 +59,12 @@ class CurveTables(Stored, Pictured):
         frames = {"points": self.to_dataframe, "bifurcations": self.bifurcations_frame}
         if what not in frames:
             raise InputError(f"to_csv writes points or bifurcations, not {what!r}{suggest(str(what), frames)}")
-        return write_csv(with_units(frames[what](), self._units), path, overwrite)
+        return write_csv(with_units(frames[what](), *self._observed), path, overwrite)
 
     @property
     @abstractmethod
-    def _units(self) -> UnitSystem | None:
-        """Units that the system declares."""
+    def _observed(self) -> tuple[System, int]:
+        """The system, and the degree of freedom whose amplitude is reported."""
 
     def plot(self, path: Any = None, **options: Any) -> Any:
         """Draw it: stable parts solid, unstable dashed, bifurcations marked, periods of a diagram in their own colours.
@@ -236,8 +236,8 @@ class Branch(CurveTables, BranchReadings):
         return peaks_of(self, what, measure, self._dof(dof), harmonic)
 
     @property
-    def _units(self) -> UnitSystem | None:
-        return self.system.units
+    def _observed(self) -> tuple[System, int]:
+        return self.system, self.observe
 
     @property
     def ended(self) -> str:
@@ -449,7 +449,7 @@ class Branch(CurveTables, BranchReadings):
     def _head(self) -> str:
         """What it is, in a line."""
         values = self.parameter(self.name)
-        span = _span(self.name, values[0], values[-1], self._units) if len(self) else "empty"
+        span = _span(self.name, values[0], values[-1], self.system.units) if len(self) else "empty"
         kind = "Branch" if self.nu == 1 else f"Branch of {period_name(self.nu)} motions"
         leaves = "" if self.departs is None else f"leaves {self.departs}; "
         return f"{kind}: {len(self)} points ({self.verdicts}), {span}; {leaves}{self.ended}."

@@ -15,10 +15,10 @@ from suboctave.bifurcation.bifurcation import Bifurcation
 from suboctave.curves.junction import period_name
 from suboctave.errors import InputError
 from suboctave.interruption import Interruption
+from suboctave.model.system import System
 from suboctave.results.branch import Branch, CurveTables
 from suboctave.results.readings import Readings, shared
 from suboctave.store.layout import led_by
-from suboctave.units import UnitSystem
 
 if TYPE_CHECKING:
     import pandas
@@ -191,8 +191,8 @@ class BifurcationDiagram(CurveTables):
         return list(dict.fromkeys(item.kind for item in met))
 
     @property
-    def _units(self) -> UnitSystem | None:
-        return self.root.branch.system.units
+    def _observed(self) -> tuple[System, int]:
+        return self.root.branch.system, self.root.branch.observe
 
     def to_dataframe(self, readings: Readings = False) -> pandas.DataFrame:
         """One row per point: the number, period and depth of its branch, then what `Branch.to_dataframe` has.

@@ -23,7 +23,6 @@ from suboctave.harmonic.basis import Array
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.results.between import Between, Measure, orbit_at, value_at
 from suboctave.store.layout import unit_of_column
-from suboctave.units import UnitSystem
 
 if TYPE_CHECKING:
     import pandas
@@ -96,11 +95,11 @@ class Points(Sequence[BranchPoint]):
         if not len(self):
             return self.note or "no points"
         units = self.curve.system.units
-        columns = {_titled("omega", units): self.omega}
+        columns = {_titled("omega", self.curve): self.omega}
         if units is not None:
             columns[units.cycles] = self.omega / (2.0 * math.pi)
         columns |= {name: self.parameter(name) for name in self.curve._free if name != "omega"}
-        columns[_titled("amplitude", units)] = self.amplitude
+        columns[_titled("amplitude", self.curve)] = self.amplitude
         widths = [max(14, 2 + len(title)) for title in columns]
         head = "".join(f"{title:>{width}}" for title, width in zip(columns, widths, strict=True))
         rows = [f"{'':3}{head}  stable"]
@@ -110,9 +109,9 @@ class Points(Sequence[BranchPoint]):
         return "\n".join(rows)
 
 
-def _titled(name: str, units: UnitSystem | None) -> str:
+def _titled(name: str, curve: Any) -> str:
     """The head of a column with its unit, where the system declares units."""
-    unit = unit_of_column(name, units)
+    unit = unit_of_column(name, curve.system, curve.observe)
     return f"{name} ({unit})" if unit else name
 
 
@@ -242,7 +241,7 @@ class Peaks(Sequence[Peak]):
         if not self._peaks:
             return self.note or "no peaks"
         units = self.curve.system.units
-        first, what = _titled(self.curve.name, units), _titled(self.what, units)
+        first, what = _titled(self.curve.name, self.curve), _titled(self.what, self.curve)
         room, wide = max(14, len(first) + 1), max(14, len(what) + 2)
         turns = f"{units.cycles if units else '1/time':>12}"
         head = f"{first:>{room}}{turns}{what:>{wide}}{'width':>12}{'harmonic':>10}{'phase':>9}  stable"

@@ -15,6 +15,7 @@ A user may call a parameter "amplitude". In a table or dataset that has a column
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -23,7 +24,6 @@ import numpy as np
 
 from suboctave.errors import InputError, suggest
 from suboctave.floquet.result import no_verdict
-from suboctave.units import UnitSystem
 from suboctave.version import __version__
 
 if TYPE_CHECKING:
@@ -37,28 +37,52 @@ def parameter_column(name: str, taken: Collection[str]) -> str:
     return f"parameter.{name}" if name in taken else name
 
 
-def with_units(frame: pandas.DataFrame, units: UnitSystem | None) -> pandas.DataFrame:
-    """A table of curves with units in its heads, "omega (rad/s)", and a column of frequencies behind that of omega; as
-    it is where the system declares none.
+def with_units(
+    frame: pandas.DataFrame, system: Any, observe: int | None = None, dimensions: Mapping[str, str] | None = None
+) -> pandas.DataFrame:
+    """A table with units in its heads, "omega (rad/s)", and a column of frequencies behind that of omega; as it is
+    where no system declares any. `dimensions`: of columns that are no quantities of curves.
     """
+    units = None if system is None else system.units
     if units is None:
         return frame
     if "omega" in frame:
         turns = frame["omega"] / (2.0 * np.pi)
         frame = frame.copy()
         frame.insert(list(frame.columns).index("omega") + 1, f"frequency ({units.cycles})", turns)
-    known = {str(name): unit_of_column(str(name), units) for name in frame.columns}
+    known = {str(name): unit_of_column(str(name), system, observe, dimensions) for name in frame.columns}
     return frame.rename(columns={name: f"{name} ({unit})" for name, unit in known.items() if unit})
 
 
-def unit_of_column(name: str, units: UnitSystem | None) -> str:
-    """The unit of omega and of what is read off motions, by the name of a column; empty for others, without units."""
-    if units is None:
+#: columns of states and of what is said of a degree of freedom: the number or the name of that last
+_STATE, _OF_DOF = re.compile(r"([xv])_(.+)"), re.compile(r".+_dof(.+)")
+#: dimension of displacements and velocities
+_OF_STATES = {"x": "length", "v": "length / time"}
+
+
+def unit_of_column(
+    name: str, system: Any, observe: int | None = None, dimensions: Mapping[str, str] | None = None
+) -> str:
+    """The unit of omega, time, states and of what is read off motions, by the name of a column; empty for others,
+    without units. What is said of no degree of freedom is said of the observed one.
+    """
+    units = system.units
+    if units is None or name in system.parameters:
         return ""
-    if name == "omega":
-        return units.frequency
+    if name in ("omega", "time"):
+        return str(units.frequency if name == "omega" else units.time)
+    dof, names = system.observed_dof if observe is None else observe, list(system.dof_names)
+    state, of_dof = _STATE.fullmatch(name), _OF_DOF.fullmatch(name)
+    named = state[2] if state else of_dof[1] if of_dof else ""
+    if named in names or named.isdigit():
+        dof = names.index(named) if named in names else int(named)
+    else:
+        state = None
     what = max((q for q in QUANTITIES if name == q or name.startswith(f"{q}_")), key=len, default="")
-    return units.name(QUANTITIES[what].unit) if what else ""
+    known = _OF_STATES[state[1]] if state else QUANTITIES[what].unit if what else ""
+    dimension = (dimensions or {}).get(name, known)
+    own = system.units_of(dof) if not what or QUANTITIES[what].of_dof else units
+    return str(own.name(dimension)) if dimension else ""
 
 
 def led_by(frame: pandas.DataFrame, leading: Mapping[str, Any]) -> pandas.DataFrame:
@@ -186,6 +210,11 @@ def curve_dataset(
     return xarray.Dataset(variables, coords, attributes)
 
 
+def rotations_of(system: Any) -> dict[str, str]:
+    """The attribute that says which degrees of freedom are angles; none where none are."""
+    return {"rotations": "\n".join(map(str, sorted(system.rotations)))} if system.rotations else {}
+
+
 # --------------------------------------------------------------------------------------------------------- a branch
 def branch_dataset(branch: Any) -> xarray.Dataset:
     """A computed branch as a labelled dataset; docs/results.md describes the layout."""
@@ -218,9 +247,9 @@ def branch_dataset(branch: Any) -> xarray.Dataset:
     if any(ending.early for ending in branch.endings):
         dataset = dataset.assign_attrs(early=1)
     if units := branch.system.units:
-        dataset = dataset.assign_attrs(units=str(units))
+        dataset = dataset.assign_attrs(units=str(units), **rotations_of(branch.system))
         dataset["omega"].attrs["units"] = units.frequency
-        dataset["amplitude"].attrs["units"] = units.name(QUANTITIES["amplitude"].unit)
+        dataset["amplitude"].attrs["units"] = branch.system.units_of(branch.observe).name(QUANTITIES["amplitude"].unit)
     kind = getattr(branch, "kind", None)
     if kind is None or branch.plane is None:
         return dataset

@@ -13,6 +13,7 @@ from suboctave.atomic import free_place, replace_file
 from suboctave.errors import InputError, suggest
 from suboctave.harmonic.linear_part import LinearPart
 from suboctave.interruption import Interruption
+from suboctave.store.layout import with_units
 from suboctave.store.plain import array_of, flat
 from suboctave.store.registry import Codec, Datasets, Stored, from_datasets, parts_of, register, to_datasets
 
@@ -72,8 +73,11 @@ class Table:
         return pd.DataFrame(dict(self.columns))
 
     def to_csv(self, path: str | Path, overwrite: bool = False) -> Path:
-        """The table as comma-separated text; a file that exists is left alone unless `overwrite`."""
-        return write_csv(self.to_dataframe(), path, overwrite)
+        """The table as comma-separated text, with the units that the system of its result declares in the heads; a file
+        that exists is left alone unless `overwrite`.
+        """
+        system, dimensions = (getattr(self.result, name, None) for name in ("system", "dimensions"))
+        return write_csv(with_units(self.to_dataframe(), system, dimensions=dimensions), path, overwrite)
 
     def __repr__(self) -> str:
         return f"Table: {self.title or 'untitled'}, {len(self)} rows\n{self.to_dataframe().to_string()}"

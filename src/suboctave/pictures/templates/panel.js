@@ -136,16 +136,20 @@ function goAlong(step) {
 
 // All displacements and their velocities over one period of the motion.
 function saveMotion(curve, place) {
-  const { length, time } = curve.units;
+  const { time } = curve.units;
   const own = curve.signals.map((_, i) => samples(coefficients(place, i), curve.nu, place.omega));
-  const heads = curve.signals.flatMap(({ label }) => [withUnit(label, length), withUnit(`d(${label})/dt`, length && `${length}/${time}`)]);
+  const heads = curve.signals.flatMap(({ label }, i) => {
+    const length = lengthOf(curve, i);
+    return [withUnit(label, length), withUnit(`d(${label})/dt`, length && `${length}/${time}`)];
+  });
   const rows = own[0].t.map((t, i) => [t, ...own.flatMap(({ x, v }) => [x[i], v[i]])]);
   save("motion.csv", csv([[withUnit("t", time), ...heads], ...rows]), "text/csv");
 }
 
 // Every displacement of the motion in numbers; a click on one shows it, here and in all figures.
 function displacementsOf(curve, place, signal) {
-  const unit = curve.units.length || "", table = element("table", "", { "aria-label": "Displacements" }), head = table.createTHead().insertRow();
+  const lengths = new Set(curve.signals.map((_, i) => lengthOf(curve, i) || "")), unit = lengths.size === 1 ? [...lengths][0] : "";
+  const table = element("table", "", { "aria-label": "Displacements" }), head = table.createTHead().insertRow();
   for (const [words, whole] of [["", ""], ["max", "largest |x|"], ["p-p", "peak to peak"], ["mean", "mean"], ["1 ω", "amplitude of harmonic 1"]]) {
     head.append(element("th", words, { scope: "col", title: whole }));
   }
@@ -153,7 +157,7 @@ function displacementsOf(curve, place, signal) {
   curve.signals.forEach(({ label }, i) => {
     const row = body.insertRow(), c = coefficients(place, i), name = element("td", "", { class: "text" });
     const own = button("", () => { view.signal = label; showSelectors(); redraw(); }, `Show ${label}`);
-    own.innerHTML = inHtml(label);
+    own.innerHTML = lengths.size > 1 ? withUnit(inHtml(label), lengthOf(curve, i)) : inHtml(label);
     name.append(own);
     row.append(name);
     for (const what of ["amplitude", "peak_to_peak", "mean", "harmonic"]) {
@@ -186,7 +190,7 @@ function forcesOf(curve, place) {
     for (const one of touching.filter((own) => own.name === name)) {
       const state = one.share === 0 ? "never touches" : one.share > 0.9999999 ? "touches always"
         : `touches ${(100 * one.share).toFixed(1)} % of the period, ${one.begun} contact${one.begun === 1 ? "" : "s"} in it`;
-      line.append(`; at ${curve.signals[one.signal].label} = ${withWords(shown(one.level, 5), curve.units.length)} it ${state}`);
+      line.append(`; at ${curve.signals[one.signal].label} = ${withWords(shown(one.level, 5), lengthOf(curve, one.signal))} it ${state}`);
     }
     panel.append(line);
   });
@@ -212,7 +216,7 @@ function picture(heading, words, data, layout, round) {
 
 function motionPictures(curve, place, c, signal) {
   const { omega } = place, { nu } = curve, sampled = samples(c, nu, omega), { tau, x, v, count } = sampled;
-  const ink = tone(0), soft = dark() ? "#a9adb3" : "#8c8c8c", { length, time } = curve.units;
+  const ink = tone(0), soft = dark() ? "#a9adb3" : "#8c8c8c", { time } = curve.units, length = lengthOf(curve, signal);
   const line = { color: ink, width: 2, simplify: false };
   const largest = quantityOf(c, nu, omega, "amplitude"), label = inHtml(curve.signals[signal].label);
   const sub = withUnit(label, length);

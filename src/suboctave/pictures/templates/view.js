@@ -23,12 +23,15 @@ function inHtml(label) {
 
 // The unit of the quantity that is drawn, of a curve that declares units; empty where it declares none.
 function unitOf(curve, quantity = view.quantity) {
-  const { length, force, time } = curve.units;
+  const { force, time } = curve.units, length = lengthOf(curve, Math.max(0, signalOf(curve)));
   if (quantity === "phase") { return "°"; }
   if (!length) { return ""; }
   if (forceOf(quantity) !== null) { return force; }
   return length + ({ velocity: `/${time}`, acceleration: `/${time}²` }[quantity] ?? "");
 }
+
+// The unit of a displacement: rad of an angle.
+function lengthOf(curve, signal) { return curve.signals[signal]?.length || curve.units.length; }
 
 function withUnit(text, unit) { return unit ? `${text} (${unit})` : text; }
 
