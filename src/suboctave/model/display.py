@@ -158,6 +158,26 @@ def _name(system: Any, i: int) -> str:
     return system.dof_names[i] if system.dof_names else f"x{i}"
 
 
+def system_text(system: Any) -> str:
+    """A system in lines: degrees of freedom, elements, loads, parameters, angles, units."""
+    title = f"System {system.name!r}" if system.name else "System"
+    names = f" ({', '.join(system.dof_names[:8])}{', ...' * (system.n > 8)})" if system.dof_names else ""
+    lines = [f"{title}: {system.n} {'degree' if system.n == 1 else 'degrees'} of freedom{names}"]
+    for kind, items in (("elements", system.elements), ("loads", system.loads)):
+        shown = [repr(item) for item in items[:6]] + (["..."] if len(items) > 6 else [])
+        lines += [f"  {kind if not i else '':<10} {text}" for i, text in enumerate(shown)]
+    if system.parameters:
+        values = ", ".join(f"{name} = {value:g}" for name, value in system.parameters.items())
+        lines.append(f"  parameters {values}")
+    if system.angles:
+        lines.append(f"  angles     {', '.join(angle.name(system.dof_names) for angle in system.angles)}")
+    if system.units:
+        lines.append(
+            f"  units      {system.units}; mass in {system.units.mass}, frequencies in {system.units.frequency}"
+        )
+    return "\n".join(lines)
+
+
 def system_html(system: Any) -> str:
     """A `System` as HTML: text, MathML, tables and a drawing, nothing that is fetched or run."""
     small = system.n <= _WRITTEN

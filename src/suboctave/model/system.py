@@ -434,20 +434,9 @@ class System:
         return functools.partial(_assemble, **parts), ()
 
     def __repr__(self) -> str:
-        title = f"System {self.name!r}" if self.name else "System"
-        names = f" ({', '.join(self.dof_names[:8])}{', ...' * (self.n > 8)})" if self.dof_names else ""
-        lines = [f"{title}: {self.n} {'degree' if self.n == 1 else 'degrees'} of freedom{names}"]
-        for kind, items in (("elements", self.elements), ("loads", self.loads)):
-            shown = [repr(item) for item in items[:6]] + (["..."] if len(items) > 6 else [])
-            lines += [f"  {kind if not i else '':<10} {text}" for i, text in enumerate(shown)]
-        if self.parameters:
-            values = ", ".join(f"{name} = {value:g}" for name, value in self.parameters.items())
-            lines.append(f"  parameters {values}")
-        if self.angles:
-            lines.append(f"  angles     {', '.join(angle.name(self.dof_names) for angle in self.angles)}")
-        if self.units:
-            lines.append(f"  units      {self.units}; mass in {self.units.mass}, frequencies in {self.units.frequency}")
-        return "\n".join(lines)
+        from suboctave.model.display import system_text
+
+        return system_text(self)
 
     def _repr_html_(self) -> str:
         from suboctave.model.display import system_html
