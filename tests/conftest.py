@@ -13,12 +13,15 @@ import suboctave as so
 
 #: tests compute on one core each: what they find does not depend on it
 os.environ.setdefault("SUBOCTAVE_WORKERS", "1")
+#: what is collected is no garbage
+gc.disable()
 
 
 def pytest_collection_finish():
     """What is there once the tests are collected, stays: the collector of garbage need not look through it again."""
     gc.collect()
     gc.freeze()
+    gc.enable()
     gc.set_threshold(20_000, 20, 20)
 
 

@@ -42,7 +42,7 @@ def chain(whole=False, n=8, **parameters):
 
 
 def of_chain(system):
-    return so.nonlinear_mode(system, mode=2, amplitude=(0.05, 0.75), harmonics=7).bifurcations["PD"][0]
+    return so.nonlinear_mode(system, mode=2, amplitude=(0.05, 0.75), harmonics=5).bifurcations["PD"][0]
 
 
 @cache

@@ -279,7 +279,7 @@ def test_a_stop_begins_where_it_is_reached():
 @pytest.mark.parametrize("damped", [False, True])
 def test_a_condensed_structure_has_its_mass(damped):
     """Of a chain only the nonlinear mass is an unknown: the same mode as with all of them."""
-    n = 12
+    n = 7
     chain = 2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
     few, whole = (
         so.System(np.eye(n), 0.05 * chain, chain, [so.CubicSpring(0, 1.0), *more])

@@ -95,7 +95,7 @@ def test_wrong_input_to_integrate_is_refused(oscillator):
     with pytest.raises(InputError, match="must be a System"):
         so.integrate("oscillator", omega=2.0)
     with pytest.raises(ConvergenceError, match="overflow or need too many steps"):
-        so.integrate(oscillator, omega=2.0, periods=400, parameters={"zeta": -3.0})
+        so.integrate(oscillator, omega=2.0, periods=400, parameters={"zeta": -30.0})
 
 
 # ---------------------------------------------------------------------------------------------------------- sections
