@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, Self, TypeVar, overload
 
 import numpy as np
 
@@ -33,8 +33,33 @@ _HALF = math.sqrt(0.5)
 _EVEN = 1e-9
 
 
+Item = TypeVar("Item")
+
+
+class Found(Sequence[Item]):
+    """Some things on a curve, in its order; `note` says why there are none."""
+
+    def __init__(self, curve: Any, items: Sequence[Item], note: str = "") -> None:
+        self.curve, self.note = curve, note
+        self._items = tuple(items)
+
+    def _some(self, items: Sequence[Item]) -> Self:
+        return type(self)(self.curve, items, self.note)
+
+    def __len__(self) -> int:
+        return len(self._items)
+
+    @overload
+    def __getitem__(self, key: int) -> Item: ...
+    @overload
+    def __getitem__(self, key: slice) -> Self: ...
+
+    def __getitem__(self, key: int | slice) -> Item | Self:
+        return self._some(self._items[key]) if isinstance(key, slice) else self._items[key]
+
+
 @checked(result=True)
-class Points(Sequence[BranchPoint]):
+class Points(Found[BranchPoint]):
     """Some points of a curve, in its order; a table when printed.
 
     Attributes
@@ -44,21 +69,6 @@ class Points(Sequence[BranchPoint]):
     note
         Why there are none, where there are none.
     """
-
-    def __init__(self, curve: Any, points: Sequence[BranchPoint], note: str = "") -> None:
-        self.curve, self.note = curve, note
-        self._points = tuple(points)
-
-    def __len__(self) -> int:
-        return len(self._points)
-
-    @overload
-    def __getitem__(self, key: int) -> BranchPoint: ...
-    @overload
-    def __getitem__(self, key: slice) -> Points: ...
-
-    def __getitem__(self, key: int | slice) -> BranchPoint | Points:
-        return Points(self.curve, self._points[key]) if isinstance(key, slice) else self._points[key]
 
     @property
     def orbits(self) -> list[PeriodicOrbit]:
@@ -195,30 +205,24 @@ class Peak:
 
 
 @checked(result=True)
-class Peaks(Sequence[Peak]):
-    """The peaks of a curve, in its order; a table when printed. `highest` is the one of them that is."""
+class Peaks(Found[Peak]):
+    """The peaks of a curve, in its order; a table when printed. `highest` is the one of them that is, `what` says of
+    which quantity they are.
+    """
 
-    def __init__(self, curve: Any, what: str, peaks: Sequence[Peak], note: str = "") -> None:
-        self.curve, self.what, self.note = curve, what, note
-        self._peaks = tuple(peaks)
+    def __init__(self, curve: Any, peaks: Sequence[Peak], note: str = "", *, what: str = "amplitude") -> None:
+        super().__init__(curve, peaks, note)
+        self.what = what
 
-    def __len__(self) -> int:
-        return len(self._peaks)
-
-    @overload
-    def __getitem__(self, key: int) -> Peak: ...
-    @overload
-    def __getitem__(self, key: slice) -> Peaks: ...
-
-    def __getitem__(self, key: int | slice) -> Peak | Peaks:
-        return Peaks(self.curve, self.what, self._peaks[key]) if isinstance(key, slice) else self._peaks[key]
+    def _some(self, items: Sequence[Peak]) -> Self:
+        return type(self)(self.curve, items, self.note, what=self.what)
 
     @property
     def highest(self) -> Peak:
         """The highest peak."""
-        if not self._peaks:
+        if not self._items:
             raise InputError(self.note or "there are no peaks")
-        return max(self._peaks, key=lambda peak: peak.height)
+        return max(self._items, key=lambda peak: peak.height)
 
     def to_dataframe(self) -> pandas.DataFrame:
         """One row per peak: parameter, Hz, height, half-power width and points, harmonic, phase, stability.
@@ -238,7 +242,7 @@ class Peaks(Sequence[Peak]):
         return pd.DataFrame(rows, columns=names)
 
     def __repr__(self) -> str:
-        if not self._peaks:
+        if not self._items:
             return self.note or "no peaks"
         units = self.curve.system.units
         first, what = _titled(self.curve.name, self.curve), _titled(self.what, self.curve)
@@ -258,12 +262,12 @@ class Peaks(Sequence[Peak]):
 def peaks_of(curve: Any, what: str, measure: Measure, dof: int, harmonic: float | None) -> Peaks:
     """See `Branch.peaks`; `measure` of a motion, called `what`, `dof` the one whose components are named."""
     if len(curve) < 2:
-        return Peaks(curve, what, (), "the curve has no two points")
+        return Peaks(curve, (), "the curve has no two points", what=what)
     search = _Search(curve, measure)
     with one_thread():
         peaks = [search.peak(place, dof, harmonic) for place in search.places()]
     note = f"no peak of {what}: it is largest at an end of the curve, or the same all along it"
-    return Peaks(curve, what, peaks, "" if peaks else note)
+    return Peaks(curve, peaks, "" if peaks else note, what=what)
 
 
 class _Search:
