@@ -93,3 +93,10 @@ def test_attributes_that_pages_speak_of_exist(results):
                 if attribute not in OTHERS and not any(hasattr(one, attribute) for one in results[name]):
                     missing.append(f"{path.name}: {name}.{attribute}")
     assert not missing, "\n".join(missing)
+
+
+def test_no_class_is_described_twice():
+    """The page of results leaves out those that have a section of their own."""
+    own = {name for page in PAGES.values() for name in re.findall(r"autoclass:: suboctave\.(\w+)", page)}
+    left_out = re.search(r":exclude-members: (.+)", PAGES["results"])
+    assert set(left_out[1].split(", ")) == own & set(suboctave.results.__all__)
