@@ -27,7 +27,7 @@ from dataclasses import dataclass, field
 from itertools import islice
 
 import numpy as np
-from random_systems import Description, describe, short, system_of
+from random_systems import Description, describe, short, stated, system_of
 from threadpoolctl import threadpool_limits
 
 import suboctave as so
@@ -155,7 +155,9 @@ def differences(one: so.Branch, other: so.Branch, tips: list[so.PeriodicOrbit], 
         if abs(a - b) > 1e-3 * width:
             yield f"omega reaches {a:.9g} and {b:.9g}"
     folds = [[item.omega for item in branch.bifurcations["LP"]] for branch in (one, other)]
-    if len(folds[0]) != len(folds[1]):
+    # a branch may say of one of them that it could not be located
+    untold = [[f for f in folds[1 - i] if not stated(f, (one, other)[i], width)] for i in (0, 1)]
+    if len(folds[0]) != len(folds[1]) and (len(folds[0]) < len(untold[0]) or len(folds[1]) < len(untold[1])):
         yield f"limit points {' '.join(f'{f:.9g}' for f in folds[0])} and {' '.join(f'{f:.9g}' for f in folds[1])}"
     first, last = (BranchPoint(tip, None, 0.0, 0) for tip in tips)
     for a, b, ends in ((one, other, (last, first)), (other, one, (first, last))):
