@@ -12,6 +12,7 @@ import math
 import numpy as np
 
 from suboctave.compiled import kernel
+from suboctave.harmonic.aft.closed_form import add_laws
 from suboctave.harmonic.basis import Array, ComplexArray
 
 __all__ = [
@@ -21,6 +22,7 @@ __all__ = [
     "apply_blocks",
     "balance_residual",
     "block_diagonal",
+    "evaluated",
     "galerkin",
     "sparse",
     "toeplitz",
@@ -128,6 +130,23 @@ def balance_residual(x, blocks, force, load, directions, weight, parts, sizes):
             sizes[3] += w * load[r, i] * load[r, i]
     for k in range(4):
         sizes[k] = math.sqrt(sizes[k])
+
+
+@kernel()
+def evaluated(x, blocks, load, directions, weight, laws, motions, table, parts, sizes):
+    """A motion at once where all laws are known in closed form (`ClosedLaws`): displacements along the directions into
+    `motions` (G, H + 1), spectra into `table` (3, G, top + 1), both zero, and what `balance_residual` gives. Returns
+    whether forces and slopes are finite.
+    """
+    add_displacements(x, directions, motions)
+    add_laws(motions, laws, table)
+    balance_residual(x, blocks, table[0], load, directions, weight, parts, sizes)
+    whole = 0.0
+    # a number that is not finite at any instant is in all coefficients
+    for part in range(2):
+        for g in range(table.shape[1]):
+            whole += abs(table[part, g, 0])
+    return math.isfinite(whole)
 
 
 @kernel()

@@ -162,7 +162,7 @@ class Equations:
         """Where the forces of all channels act, (C, size)."""
         return np.array([group.direction for group in self.all_groups]).reshape(-1, self.size)
 
-    @property
+    @lazy
     def steady(self) -> bool:
         """Whether the forces of the elements do not depend on omega at fixed X."""
         return not (self.any_moving or self.own)

@@ -18,6 +18,7 @@ import numpy as np
 from suboctave.arguments import checked
 from suboctave.errors import InputError, NotFiniteError
 from suboctave.harmonic.aft.channel import Channel, Group, laws_along
+from suboctave.harmonic.aft.closed_form import add_laws
 from suboctave.harmonic.aft.law import Along, LawAlong, LocalMotion
 from suboctave.harmonic.aft.table import PackedLaws
 from suboctave.harmonic.assembly import (
@@ -27,6 +28,7 @@ from suboctave.harmonic.assembly import (
     apply_blocks,
     balance_residual,
     block_diagonal,
+    evaluated,
     sparse,
     toeplitz,
 )
@@ -79,7 +81,11 @@ class HarmonicBalance(Equations):
         if len(used) < len(self.values):
             missing = [name for name in self.values if name not in used]
             raise InputError(f"values leaves out {', '.join(missing)}: give all parameters, or none for the system's")
-        return BalanceState(self, self.linear_at(omega, used), self.shaped(np.asarray(x, float)), float(omega), used)
+        return self.state(self.shaped(np.asarray(x, float)), float(omega), used)
+
+    def state(self, x: Array, omega: float, values: Mapping[str, float]) -> BalanceState:
+        """The same of coefficients in their shape and all parameter values, as curves ask for it at every iteration."""
+        return BalanceState(self, self.linear_at(omega, values), x, omega, values)
 
     def linear_at(self, omega: float, values: Mapping[str, float]) -> LinearPart:
         """The linear part at parameter values, for motions at a frequency."""
@@ -111,6 +117,11 @@ class Balanced(NamedTuple):
     residual: Array
     size: float
     scale: float
+
+
+def _balanced(parts: Array, sizes: Array) -> Balanced:
+    size, *forces = sizes.tolist()
+    return Balanced(parts[1], parts[2], size, sum(forces))
 
 
 class BalanceState:
@@ -157,9 +168,26 @@ class BalanceState:
         return self.laws.packed
 
     @lazy
+    def _at_once(self) -> tuple[ComplexArray, ComplexArray, Balanced] | None:
+        """Displacements, spectra, and what balances, where all laws are known in closed form; else None."""
+        balance, packed, high = self.balance, self.packed, self.basis.harmonics
+        if balance.own or not packed.whole:
+            return None
+        groups, laws = len(balance.groups), packed.closed(high, balance.top)
+        motions, table = np.zeros((groups, high + 1), dtype=complex), np.zeros((3, groups, balance.top + 1), complex)
+        parts, sizes, weight = np.empty((3, *self.x.shape)), np.empty(4), balance.scales()[1]
+        finite = evaluated(
+            self.x, self.blocks, self.load, balance.directions, weight, laws, motions, table, parts, sizes
+        )
+        if not finite:
+            self._all_finite(table)
+        return motions, table, _balanced(parts, sizes)
+
+    @lazy
     def motions(self) -> ComplexArray:
         """Complex coefficients of the displacement along each group's direction, (G, H + 1)."""
-        return self._displacements(self.balance.directions, len(self.balance.groups))
+        known = self._at_once
+        return self._displacements(self.balance.directions, len(self.balance.groups)) if known is None else known[0]
 
     @lazy
     def nodes(self) -> list[Nodes]:
@@ -215,9 +243,12 @@ class BalanceState:
         """Spectra of force, stiffness and damping along all channels, (3, C, top + 1); of elements with channels of
         their own the force alone.
         """
+        known = self._at_once
+        if known is not None:
+            return known[1]
         balance, packed, motions = self.balance, self.packed, self.motions
         table = np.zeros((3, len(balance.all_groups), balance.top + 1), dtype=complex)
-        packed.add_spectra(motions, self.nodes, table)
+        add_laws(motions, packed.closed(self.basis.harmonics, balance.top), table)
         if not packed.whole:
             for g, (along, laws) in enumerate(self._along):
                 for law in laws:
@@ -229,9 +260,12 @@ class BalanceState:
         # a number that is not finite at any instant is in all coefficients
         means = table[:, :, 0].ravel()
         if not cmath.isfinite(means.dot(means)):
-            for g, group in enumerate(balance.groups):
-                self._require_finite(table[:, g], group)
+            self._all_finite(table)
         return table
+
+    def _all_finite(self, table: ComplexArray) -> None:
+        for g, group in enumerate(self.balance.groups):
+            self._require_finite(table[:, g], group)
 
     @property
     def force_spectra(self) -> ComplexArray:
@@ -262,12 +296,14 @@ class BalanceState:
     @lazy
     def balanced(self) -> Balanced:
         """What balances: see `Balanced`."""
+        known = self._at_once
+        if known is not None:
+            return known[2]
         balance = self.balance
         parts, sizes = np.empty((3, *self.x.shape)), np.empty(4)
         weight = balance.scales()[1]
         balance_residual(self.x, self.blocks, self._spectra[0], self.load, balance.directions, weight, parts, sizes)
-        size, *forces = sizes.tolist()
-        return Balanced(parts[1], parts[2], size, sum(forces))
+        return _balanced(parts, sizes)
 
     def same_law(self, channel: Channel, one: ComplexArray, other: ComplexArray) -> bool:
         """Whether two spectra of a law's force and slopes (1 + Q, top + 1) differ by what matters nowhere.
@@ -356,7 +392,7 @@ class BalanceState:
     @lazy
     def half_jacobian(self) -> Array:
         """J_half: the same operator in the half-odd basis up to H + 1/2; singular at a period doubling."""
-        frequencies, rows = self.basis.half_multiples * self.omega, self.balance.size * (self.basis.size + 1)
+        frequencies, rows = self.basis.half_multiples * self.omega, self.x.size + self.balance.size
         return self._add_tangent(np.zeros((rows, rows)), self.linear.stiffness(frequencies), mean=False)
 
     @property
@@ -366,8 +402,10 @@ class BalanceState:
 
     def residual_by(self, name: str) -> Array:
         """R differentiated by "omega" or a parameter, shape (dimension,)."""
-        block = self.linear_by(name)
+        block, balance = self.linear_by(name), self.balance
         result = np.zeros(self.x.shape) if block is None else apply_blocks(block, self.x)
+        if name == "omega" and balance.steady and name not in balance.load_names:
+            return result.ravel()
         change = self.unbalanced_by(name)
         return (result if change is None else result + change).ravel()
 
@@ -511,5 +549,5 @@ def _response(blocks: ComplexArray, force: ComplexArray) -> ComplexArray | None:
 
 def length(vector: Array) -> float:
     """Euclidean norm of all entries."""
-    flat = vector.ravel()
+    flat = vector if vector.ndim == 1 else vector.ravel()
     return math.sqrt(flat.dot(flat))

@@ -163,7 +163,14 @@ class StructuralMatrices(EquationOfMotion):
 
     def stiffness(self, frequency: NDArray[Any], order: int = 0) -> ComplexArray:
         """See `LinearPart.stiffness`."""
-        return _blocks(self.matrices, frequency, order)
+        out: ComplexArray = np.empty((frequency.size, self.size, self.size), dtype=complex)
+        dynamic_stiffness(self._entries, frequency.astype(complex), order, out.reshape(frequency.size, -1))
+        return out
+
+    @lazy
+    def _entries(self) -> Array:
+        """The same matrices, with all entries of each in a row."""
+        return self.matrices.reshape(4, -1)
 
     def stiffness_by(self, frequency: Array, names: tuple[str, ...], order: int = 0) -> ComplexArray | None:
         """See `LinearPart.stiffness_by`."""
@@ -214,7 +221,8 @@ class StructuralMatrices(EquationOfMotion):
         """See `LinearPart.fed`."""
         other = copy.copy(self)
         other.matrices = fed_matrices(self.matrices, rate)
-        vars(other).pop("_equation", None)
+        for made in ("_equation", "_entries"):
+            vars(other).pop(made, None)
         return other
 
     def feeding(self, frequency: Array) -> ComplexArray:

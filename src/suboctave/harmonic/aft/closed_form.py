@@ -11,10 +11,13 @@ p the polynomial of degree 10 that agrees at the Chebyshev nodes, with an error 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from suboctave.compiled import kernel
+from suboctave.harmonic.basis import Array
+from suboctave.harmonic.quadrature import sharp_nodes
 from suboctave.harmonic.trigonometric import FAST, crossings_of, displacement, extrema, jet, spectra
 
 #: no pieces or steps
@@ -23,6 +26,35 @@ _LOW, _HIGH = math.sqrt(2.0) - 1.0, math.sqrt(2.0) + 1.0
 _P0, _P1, _P2, _P3 = -0.3333333333333333, 0.1999999999999552, -0.14285714284666542, 0.11111111015256361
 _P4, _P5, _P6, _P7 = -0.09090904578123903, 0.07692183190826087, -0.06664511447381948, 0.0585814891280221
 _P8, _P9, _P10 = -0.0508544973794026, 0.03923165829558719, -0.01917688711906226
+
+
+class ClosedLaws(NamedTuple):
+    """The laws of G directions that are known in closed form, for motions of some number of harmonics.
+
+    pieces, first
+        See `table.PackedLaws`.
+    owner, polynomial, steps
+        Of the smooth ones, polynomials and arctan steps: their directions (S,), and coefficients and rows of steps one
+        after the other.
+    starts
+        Where in `polynomial`, `steps` and `nodes` those of each begin, (3, S + 1).
+    nodes
+        Cosines, sines and weights of the instants at which polynomials are evaluated, one set after the other, (3, N).
+    grid
+        Points on the circle for searches along the motion, (2, M).
+    rules
+        `quadrature.rule_tables`.
+    """
+
+    pieces: Array
+    first: np.ndarray
+    owner: np.ndarray
+    polynomial: Array
+    steps: Array
+    starts: np.ndarray
+    nodes: Array
+    grid: Array
+    rules: tuple[Array, Array]
 
 
 @kernel()
@@ -192,6 +224,27 @@ def add_smooth(c, polynomial, steps, zr, zi, weights, table, g):
     for q in range(table.shape[2]):
         table[0, g, q] += sums[0, q]
         table[1, g, q] += sums[1, q]
+
+
+@kernel()
+def add_laws(motions, laws, table):
+    """Add the Fourier coefficients of laws (`ClosedLaws`) along motions (G, H + 1), and of their slopes, to `table`
+    (>= 2, >= G, top + 1).
+    """
+    zr, zi = laws.grid[0], laws.grid[1]
+    if laws.pieces.shape[0] > 0:
+        add_pieces(motions, laws.pieces, laws.first, zr, zi, table)
+    top, high = table.shape[2] - 1, motions.shape[1] - 1
+    for s in range(laws.owner.shape[0]):
+        g = laws.owner[s]
+        polynomial = laws.polynomial[laws.starts[0, s] : laws.starts[0, s + 1]]
+        steps = laws.steps[laws.starts[1, s] : laws.starts[1, s + 1]]
+        at = laws.nodes[:, laws.starts[2, s] : laws.starts[2, s + 1]]
+        nr, ni, weights = at[0], at[1], at[2]
+        if steps.shape[0] > 0:
+            places, widths = steps[:, 0].copy(), steps[:, 1].copy()
+            nr, ni, weights = sharp_nodes(motions[g], places, widths, top + high, zr, zi, laws.rules[0], laws.rules[1])
+        add_smooth(motions[g], polynomial, steps, nr, ni, weights, table, g)
 
 
 @kernel()

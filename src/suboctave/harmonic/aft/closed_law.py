@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from suboctave.harmonic.aft.closed_form import add_changed_pieces
+from suboctave.harmonic.aft.closed_form import add_changed_pieces, add_laws
 from suboctave.harmonic.aft.general import GeneralLaw
 from suboctave.harmonic.aft.law import Along, CoefficientSpectra, LawAlong, Member, Second, Third
 from suboctave.harmonic.aft.table import PackedLaws, Weights
@@ -47,8 +47,9 @@ class ClosedForm(LawAlong):
 
     def add_spectra(self, out: ComplexArray) -> None:
         """See `LawAlong.add_spectra`."""
-        own = ClosedForm(self.along, self.members)
-        own._packed.add_spectra(self.along.motions, own._nodes, out[:, None])
+        motions, table = self.along.motions, np.zeros((3, 1, out.shape[1]), dtype=complex)
+        add_laws(motions, PackedLaws([self.members]).closed(motions.shape[1] - 1, out.shape[1] - 1), table)
+        out += table[: len(out), 0]
 
     @lazy
     def _weights(self) -> list[Weights]:

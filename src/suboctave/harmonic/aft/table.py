@@ -9,10 +9,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from suboctave.harmonic.aft.closed_form import NO_ROWS, add_pieces, add_smooth, corner_weights, smooth_weights
+from suboctave.harmonic.aft.closed_form import NO_ROWS, ClosedLaws, corner_weights, smooth_weights
 from suboctave.harmonic.aft.law import Member
 from suboctave.harmonic.basis import Array, ComplexArray
-from suboctave.harmonic.quadrature import FEWEST, Nodes, graded_nodes, polynomial_nodes, search_grid
+from suboctave.harmonic.quadrature import FEWEST, Nodes, graded_nodes, polynomial_nodes, rule_tables, search_grid
 from suboctave.model.elements.smoothness import (
     AdaptiveSampling,
     PiecewiseLinear,
@@ -118,6 +118,8 @@ class PackedLaws:
         self.polynomial = np.zeros((len(self.line), max(map(len, polynomials), default=0)))
         for row, polynomial in zip(self.polynomial, polynomials, strict=False):
             row[: len(polynomial)] = polynomial
+        #: by highest harmonic of a motion, and of a spectrum
+        self._closed: dict[tuple[int, int], ClosedLaws] = {}
         #: direction, polynomial, steps, and these' places and widths, of all laws that are smooth
         self._smooth: list[tuple[int, Array, Array, tuple[Array, Array] | None]] = [
             (g, self.polynomial[g], NO_ROWS, None) for g, polynomial in enumerate(polynomials) if polynomial
@@ -132,15 +134,32 @@ class PackedLaws:
         """Nodes for every smooth law along motions (G, H + 1), good for Fourier coefficients up to `top`."""
         return [_nodes(motions[g], polynomial, sharp, top) for g, polynomial, _, sharp in self._smooth]
 
-    def add_spectra(self, motions: ComplexArray, nodes: list[Nodes], table: ComplexArray) -> None:
-        """Add the Fourier coefficients of the laws known in closed form along motions (G, H + 1), and of their slopes,
-        to `table` (>= 2, >= G, top + 1).
-        """
-        if len(self.pieces):
-            grid = search_grid(motions.shape[1] - 1)
-            add_pieces(motions, self.pieces, self.first, grid.zr, grid.zi, table)
-        for (g, polynomial, steps, _), at in zip(self._smooth, nodes, strict=True):
-            add_smooth(motions[g], polynomial, steps, at.zr, at.zi, at.weights, table, g)
+    def closed(self, high: int, top: int) -> ClosedLaws:
+        """The laws known in closed form along motions of harmonics up to `high`, for Fourier coefficients to `top`."""
+        known = self._closed.get((high, top))
+        if known is None:
+            known = self._closed[high, top] = self._closed_laws(high, top)
+        return known
+
+    def _closed_laws(self, high: int, top: int) -> ClosedLaws:
+        smooth, grid = self._smooth, search_grid(high)
+        sets = [np.zeros((3, 0))] * len(smooth)
+        for s, (_, polynomial, _, sharp) in enumerate(smooth):
+            if sharp is None:
+                at = polynomial_nodes((len(polynomial) - 1) * high, top)
+                sets[s] = np.array((at.zr, at.zi, at.weights))
+        sizes = [[len(one[1]) for one in smooth], [len(one[2]) for one in smooth], [one.shape[1] for one in sets]]
+        return ClosedLaws(
+            self.pieces,
+            self.first,
+            np.array([one[0] for one in smooth], dtype=np.int64),
+            np.concatenate([np.zeros(0), *(one[1] for one in smooth)]),
+            np.concatenate([NO_ROWS, *(one[2] for one in smooth)]),
+            np.cumsum([[0, *row] for row in sizes], axis=1),
+            np.concatenate([np.zeros((3, 0)), *sets], axis=1),
+            np.array((grid.zr, grid.zi)),
+            rule_tables(),
+        )
 
     def weights(self, direction: int, motion: ComplexArray, nodes: list[Nodes]) -> list[Weights]:
         """Second and third derivatives along the motion (H + 1,) in a direction."""
