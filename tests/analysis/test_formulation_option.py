@@ -181,3 +181,6 @@ class _Sample:
     def __init__(self, floquet):
         self.floquet = floquet
         self.unstable = floquet.unstable
+
+    def outside(self, completed):
+        return self.unstable

@@ -63,7 +63,7 @@ def test_stated_errors_cover_what_is_left_out(kind, channels, smooth, monkeypatc
     for seed in range(2):
         system, _ = structure(32, 300.0, channels, kind, seed, element)
         state = motion_of(system, 9, 1.1, seed)
-        few = monodromy._Linearised(state)
+        few = monodromy.Linearised(state)
         assert few.size < 2 * system.n
         result = floquet_multipliers(state)
         with monkeypatch.context() as patch:
@@ -110,7 +110,7 @@ def test_few_states_serve_a_long_chain():
         [so.CubicSpring(n - 1, 0.3)], [so.HarmonicLoad(n - 1, 0.05)],
     )  # fmt: skip
     curve = so.frequency_response(system, (1.2, 1.1), harmonics=15)
-    motions = [monodromy._Linearised(point.orbit.state()) for point in curve.points[::8]]
+    motions = [monodromy.Linearised(point.orbit.state()) for point in curve.points[::8]]
     assert max(motion.size for motion in motions) <= 32
     assert len(in_blocks(motions[0].state.linear, motions[0].state.balance.all_groups).rates) >= 20
 

@@ -55,7 +55,7 @@ def differences(mu, errors, expected):
 
 def before(state):
     """Multipliers along the motion as it stands, with the errors of propagation alone."""
-    motion = monodromy._Linearised(state)
+    motion = monodromy.Linearised(state)
     mu, errors = motion.others()
     own, left, right = eig(motion.before, left=True, right=True)
     # a matrix that changes moves an eigenvalue by so many times as much

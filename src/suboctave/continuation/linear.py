@@ -46,7 +46,7 @@ def one_thread() -> Iterator[None]:
 
 def length(vector: Array) -> float:
     """Euclidean norm of a real array, without the overhead of `numpy.linalg.norm`."""
-    flat = vector.ravel()
+    flat = vector if vector.ndim == 1 else vector.ravel()
     return math.sqrt(flat.dot(flat))
 
 

@@ -161,7 +161,7 @@ def correct(
         if factor.singular:
             raise ConvergenceError(f"the equations are singular at {curve.where(u)}")
         rhs = evaluation.residual
-        step = factor.solve(rhs if plane is None else np.append(rhs, plane.dot(weights * (u - guess))))
+        step = factor.solve(rhs if plane is None else _beneath(rhs, plane.dot(weights * (u - guess))))
         if isinstance(row, int):
             step[row] = 0.0  # but for rounding of the factors it is
         still = options.rounding and previous <= options.correction and length(step) <= _ROUNDING
@@ -187,6 +187,13 @@ def correct(
     raise ConvergenceError(
         f"Newton's method did not converge near {where} (residual {error:.1e} after {iteration} iterations)"
     )
+
+
+def _beneath(vector: Array, number: float) -> Array:
+    """A vector with a number below it."""
+    out = np.empty(len(vector) + 1)
+    out[:-1], out[-1] = vector, number
+    return out
 
 
 def _decrease(curve: Problem, u: Array, step: Array, error: float) -> float:

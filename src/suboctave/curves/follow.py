@@ -25,6 +25,7 @@ from suboctave.curves.events.grazings import locate_grazings
 from suboctave.curves.events.layer import behind_their_grazings, jumps
 from suboctave.curves.events.monitors import (
     BRANCH_POINT,
+    NARROWEST,
     PERIOD_DOUBLING,
     BifurcationKind,
     Located,
@@ -46,6 +47,8 @@ from suboctave.errors import ConvergenceError
 from suboctave.harmonic.truncation import next_harmonics
 from suboctave.interruption import stopping, users_function
 
+#: bracket, as a share of a step, in which a bifurcation is not looked for any more that only its equations can tell
+_TOLD_APART = 2e-3
 #: growth of motions of every size at one value of the parameter after which they may grow for ever: of a piece that a
 #: branch begins with, and of others
 _GROWN = 1e12, 1e4
@@ -242,7 +245,8 @@ class _Follower(Driver):
         if rule is None or old is None or old.at_rest or new.at_rest or new.state.basis.nu > 1:
             return None
         inside = self._guard.examined(self._solved_again(old, new), new).inside
-        worst = max(inside, key=lambda sample: sample.doubt)
+        known = [sample for sample in inside if sample is new or sample.completed_is_known]
+        worst = max(known, key=lambda sample: sample.doubt)
         if worst.doubt <= CRITICAL:
             return None
         basis = next_harmonics(worst.state, rule)
@@ -343,7 +347,8 @@ class _Follower(Driver):
 
     def _look_behind(self, inside: list[Sample]) -> None:
         """What the harmonics solved for do not show of a step: hidden pairs, and open verdicts between its points."""
-        for stretch in self._hidden.passed(inside):
+        known = [sample for sample in inside if sample.completed_is_known]
+        for stretch in self._hidden.passed(known):
             pairs = [] if self._watch else pair_in(stretch, self.settings.newton)
             items = [item for entry in pairs if (item := self._bifurcation(*entry)) is not None]
             for item in items:
@@ -352,7 +357,7 @@ class _Follower(Driver):
                     self._ahead.append(item)
             if len(items) < 2:
                 self._guard.doubt(stretch[0], stretch[2], REASON)
-        self.trace.open += [s.as_point(s.floquet) for s in inside[1:-1] if not s.floquet.decided]
+        self.trace.open += [s.as_point(s.floquet) for s in known[1:-1] if not s.floquet.decided]
 
     def _search_here(self, old: Sample, again: Sample) -> None:
         """Events that lie behind a point in one discretisation and before it in the next: the way to the point is
@@ -488,8 +493,8 @@ class _Follower(Driver):
             must_solve = kind is BRANCH_POINT or kind.multiplicity > 1
             begins = a.point.arclength == 0.0 and len(self.trace.points) <= 1
             # across a corner that was passed tangents do not tell which way is ahead
-            bisections = 0 if a.place in self._corners else 9 if must_solve else 34
-            located = locate(kind, a, b, self.settings.newton, bisections, begins)
+            narrowest = 1.0 if a.place in self._corners else _TOLD_APART if must_solve else NARROWEST
+            located = locate(kind, a, b, self.settings.newton, narrowest, begins)
             unsolved = must_solve and located is not None and located.solution is None
             self._last_located = known = (kind, a, b, None if unsolved else located)
         return known[3]

@@ -29,9 +29,10 @@ from suboctave.continuation.point import CurvePoint
 from suboctave.continuation.problem import Array
 from suboctave.curves.events.monitors import BRANCH_POINT, BifurcationKind, Located, NeimarkSacker, changes
 from suboctave.curves.interior import FINEST, Interior, Steps, unsettled
-from suboctave.curves.sample import Sample
+from suboctave.curves.sample import Sample, compare, completed
 from suboctave.curves.trace import Audit
 from suboctave.floquet.held import of_those_moved
+from suboctave.floquet.result import FloquetResult
 from suboctave.floquet.symmetric import in_rings, symmetric_functions
 
 #: multipliers of modulus above one half may move by this much per interval (relative to their modulus above one)
@@ -172,7 +173,7 @@ class GuardedStep(Interior):
             return False
         # beside an interval in which several pairs cross their product comes to zero without changing its sign
         near = [(a, b) for a, b in pairwise(self.samples) if max(p.place - b.place, a.place - q.place) <= _BESIDE_PAIRS]
-        several = reason == _REASONS[3] and any(abs(a.unstable - b.unstable) > 3 for a, b in near)
+        several = reason == _REASONS[3] and any(abs(compare(a, b).change) > 3 for a, b in near)
         return several or bool(changes(p, q)) or (reason in _REASONS[1:] and _open(p, q))
 
     def cut(self, p: Sample, q: Sample, share: float) -> list[tuple[Sample, Sample]]:
@@ -192,23 +193,27 @@ class GuardedStep(Interior):
         crossing = self._look_for_crossing(p, q)
         if self.refused:
             return None
-        eventful = p.unstable != q.unstable or bool(changes(p, q))
-        if not all(self._confirmed(kind, p, q) for kind in changes(p, q) if kind.multiplicity > 1):
-            return 0.5, _TOGETHER
-        if eventful and not _explained(p, q):
-            return 0.5, (
-                f"the number of unstable multipliers changes from {p.unstable} to {q.unstable}, which "
-                "no bifurcation there explains"
-            )
-        if eventful and self._mixed(p, q):
-            return 0.5, "a pair of multipliers may cross the unit circle together with a real one"
-        if crossing is not None and self.measures(p)[0, 0] != self.measures(q)[0, 0]:
-            return 0.5, _BESIDE
+        change = compare(p, q).change
+        eventful = change != 0 or bool(changes(p, q))
+        doubt = self._doubt_at_event(p, q, change, crossing) if eventful else None
+        if doubt is not None:
+            return doubt
         doubt = super().doubt(p, q)
         if doubt is None and h > _EXAMINED and _too_fast(p, q, eventful):
             return 0.5, "multipliers move too fast to be followed"
         # right beside a branch point at which the curve turns the multiplier at +1 is known up to its error only
         return None if doubt is not None and doubt[1] == _RETURNS and h <= _EXAMINED and self.turned else doubt
+
+    def _doubt_at_event(self, p: Sample, q: Sample, change: int, crossing: Crossing | None) -> tuple[float, str] | None:
+        """The same where something has changed: the number of unstable multipliers, or a test."""
+        if not all(self._confirmed(kind, p, q) for kind in changes(p, q) if kind.multiplicity > 1):
+            return 0.5, _TOGETHER
+        if not _explained(p, q):
+            return 0.5, f"the number of unstable multipliers changes by {change}, which no bifurcation there explains"
+        if self._mixed(p, q):
+            return 0.5, "a pair of multipliers may cross the unit circle together with a real one"
+        turns = [self.measures(one, completed(p, q))[0, 0] for one in (p, q)]
+        return (0.5, _BESIDE) if crossing is not None and turns[0] != turns[1] else None
 
     def _mixed(self, p: Sample, q: Sample) -> bool:
         """Whether a pair that leaves the circle could be set off in the count by a real multiplier that enters it.
@@ -216,7 +221,7 @@ class GuardedStep(Interior):
         Its product changes sign there, and in its ring if multipliers lie in rings. Without rings it also does where
         two real ones are each other's inverses: alone the count tells which.
         """
-        if p.measures[0, -1] == q.measures[0, -1] or all(isinstance(kind, NeimarkSacker) for kind in changes(p, q)):
+        if not _pairs_change(p, q) or all(isinstance(kind, NeimarkSacker) for kind in changes(p, q)):
             return False
         stencil, at = self._around(p, q)
         rings = next(iter(self.relative(stencil, 3)), None) if len(stencil) > 2 else None
@@ -249,10 +254,11 @@ class GuardedStep(Interior):
         """See `Interior.relative`: with the functions of multipliers in rings, equal ones taken for one, then of those
         that elements move.
         """
-        known, apart = ([getattr(s.floquet, name) for s in stencil] for name in ("multipliers", "distinct"))
+        told = _told(stencil)
+        known, apart = ([getattr(one, name) for one in told] for name in ("multipliers", "distinct"))
         if self.turned or k == 0 or len({len(mu) for mu in known}) > 1 or not np.isfinite(known).all():
             return
-        if _families(stencil):
+        if _families(told):
             yield in_rings(np.array(apart), k - 1)
         elif len(apart[0]) == len(known[0]):
             yield in_rings(np.array(known), k - 1)
@@ -262,18 +268,21 @@ class GuardedStep(Interior):
         """See `Interior.tests`: of equal multipliers with one, where there are as many all along. A family that passes
         the circle in the same step as a single one would go unseen, its zero being double.
         """
-        tests = super().tests(stencil)
-        if self.turned or not _families(stencil):
+        which = completed(*stencil)
+        tests = [self.measures(one, which) for one in stencil]
+        if self.turned or not stencil[0].told(which).repeated or not _families(told := _told(stencil)):
             return tests
-        own = (symmetric_functions(s.floquet.distinct) for s in stencil)
+        own = (symmetric_functions(one.distinct) for one in told)
         return [np.column_stack((one[:, :1], functions)) for one, functions in zip(tests, own, strict=True)]
 
-    def measures(self, sample: Sample) -> Array:
-        """The tests at a sample, without their zeros at a branch point at which the curve turns back."""
+    def measures(self, sample: Sample, which: bool) -> Array:
+        """The tests at a sample, of the completed motion or as it stands, without their zeros at a branch point at
+        which the curve turns back.
+        """
         crossing = self.turned
         if crossing is None or crossing.turned is None:
-            return sample.measures
-        tests = sample.measures.copy()
+            return sample.measures(which)
+        tests = sample.measures(which).copy()
         way = sample.place - crossing.place or math.ulp(1.0)
         change = tests[0, 1] * math.exp(tests[1, 1]) - crossing.turned
         tests[0, 0] *= math.copysign(1.0, way)
@@ -294,15 +303,27 @@ _REASONS = (
 )
 
 
-def _families(stencil: Sequence[Sample]) -> bool:
+def _told(stencil: Sequence[Sample]) -> list[FloquetResult]:
+    """The multipliers that tests compare at the samples of a stencil."""
+    which = completed(*stencil)
+    return [one.told(which) for one in stencil]
+
+
+def _families(told: Sequence[FloquetResult]) -> bool:
     """Whether motions have families of equal multipliers, as many at all of them."""
-    counts = {len(s.floquet.distinct) for s in stencil}
-    return len(counts) == 1 and counts != {len(stencil[0].floquet.multipliers)}
+    counts = {len(one.distinct) for one in told}
+    return len(counts) == 1 and counts != {len(told[0].multipliers)}
 
 
 def _open(p: Sample, q: Sample) -> bool:
     """Whether a multiplier lies within its error of the unit circle at either of two samples."""
-    return not (p.floquet.decided and q.floquet.decided)
+    return not all(one.decided for one in _told((p, q)))
+
+
+def _pairs_change(p: Sample, q: Sample) -> bool:
+    """Whether the product of all pairs changes its sign."""
+    which = completed(p, q)
+    return bool(p.measures(which)[0, -1] != q.measures(which)[0, -1])
 
 
 def _disagreement(a: CurvePoint, b: CurvePoint) -> float:
@@ -316,9 +337,9 @@ def _disagreement(a: CurvePoint, b: CurvePoint) -> float:
 def _explained(p: Sample, q: Sample) -> bool:
     """Whether the tests that change across an interval explain how the number of unstable multipliers changes."""
     kinds = changes(p, q)
-    change, changed = abs(p.unstable - q.unstable), {kind.name for kind in kinds}
+    change, changed = abs(compare(p, q).change), {kind.name for kind in kinds}
     # open verdicts leave the count open, but not where the product of all pairs tells of one as well
-    pair = change > 1 and "NS" not in changed and p.measures[0, -1] != q.measures[0, -1]
+    pair = change > 1 and "NS" not in changed and _pairs_change(p, q)
     if (change == 0 and not changed) or (_open(p, q) and not pair):
         return True
     pairs = sum(kind.multiplicity for kind in kinds if kind.name == "NS")
@@ -329,9 +350,10 @@ def _explained(p: Sample, q: Sample) -> bool:
 
 def _too_fast(p: Sample, q: Sample, eventful: bool) -> bool:
     """Whether multipliers move too fast between two samples to be followed."""
-    if _movement(p.floquet.multipliers, q.floquet.multipliers) > MOVEMENT:
+    told = _told((p, q))
+    if _movement(*(one.multipliers for one in told)) > MOVEMENT:
         return True
-    ends = p.floquet.distinct, q.floquet.distinct
+    ends = [one.distinct for one in told]
     return not (eventful or (_keep_off(*ends) and _keep_off(*reversed(ends))))
 
 

@@ -196,7 +196,7 @@ class Interior(ABC):
     steps
         Those of its curve.
     reasons
-        What is in doubt where a function may vanish unseen, one sentence for each of `measures`.
+        What is in doubt where a function may vanish unseen, one sentence for each of `tests`.
     """
 
     #: length above which a step that takes too many samples is halved
@@ -216,15 +216,13 @@ class Interior(ABC):
         self.settled: list[float] = []
 
     @abstractmethod
-    def measures(self, sample: Sample) -> Array:
-        """Signs and logarithms of the moduli of functions smooth along the curve, shape (2, m)."""
-
     def tests(self, stencil: Sequence[Sample]) -> list[Array]:
-        """Those at every sample of a stencil."""
-        return [self.measures(one) for one in stencil]
+        """Signs and logarithms of the moduli of functions smooth along the curve, shape (2, m), at every sample of a
+        stencil.
+        """
 
     def relative(self, stencil: Sequence[Sample], k: int) -> Iterable[Array]:
-        """Functions (N, 2, m) with together the same zeros as `measures`' function k that are smoother where the linear
+        """Functions (N, 2, m) with together the same zeros as function k of `tests` that are smoother where the linear
         structure has many vibrations in a period, in several ways.
         """
         return ()

@@ -57,7 +57,7 @@ class CountCheck:
         if last is None:
             return None
         odd = sum(kind in ("LP", "PD", "BP") for kind in kinds)
-        before, now = last.unstable, sample.unstable
+        before, now = (one.outside(completed=True) for one in (last, sample))
         change = abs(now - before)
         # a branch that turns back at a pitchfork is its own mirror image behind it: the count does not change there
         if change <= odd + 2 * kinds.count("NS") and ("BP" in kinds or (change - odd) % 2 == 0):
@@ -87,7 +87,7 @@ Stretch = tuple[Sample, Sample, Sample]
 
 
 class HiddenDoublings:
-    """Watches a curve for stretches in which multipliers and det J_half differ."""
+    """Watches a curve for stretches in which multipliers of completed motions and det J_half differ."""
 
     def __init__(self) -> None:
         self._since: list[Sample] = []
@@ -106,13 +106,13 @@ class HiddenDoublings:
             if len(self._since) > 1:
                 before, *between = self._since
                 if all(s.half_sign == before.half_sign for s in (*between, sample)):
-                    stretches.append((before, max(between, key=lambda s: s.measures[1, 2]), sample))
+                    stretches.append((before, max(between, key=lambda s: s.floquet.symmetric[1, 1]), sample))
             self._since = [sample]
         return stretches
 
 
 def _agree(sample: Sample) -> bool:
-    return (sample.half_sign > 0.0) == (sample.measures[0, 2] > 0.0)
+    return (sample.half_sign > 0.0) == (sample.floquet.symmetric[0, 1] > 0.0)
 
 
 def pair_in(stretch: Stretch, newton: NewtonOptions) -> list[tuple[Located, Sample, Sample]]:

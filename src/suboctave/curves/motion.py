@@ -117,15 +117,13 @@ class MotionEvaluation:
         tiny motion) and the scalar equations'.
         """
         state, addition = self.state, self.equations.addition
-        if addition is None:
-            size = state.balanced.size
-        else:
+        balanced, values = state.balanced, self.equations.values
+        size = balanced.size
+        if addition is not None:
             shaped = (state.residual + addition).reshape(state.x.shape)
             size = length(shaped * state.balance.scales()[1])
-        worst = size / max(state.balanced.scale, self.curve.least_force(state), _TINY)
-        for value in self.equations.values.tolist():
-            worst = max(worst, abs(value))
-        return worst
+        worst = size / max(balanced.scale, self.curve.least_force(state), _TINY)
+        return max(worst, *map(abs, values.tolist())) if values.size else worst
 
     @lazy
     def at_rest(self) -> bool:
@@ -284,11 +282,11 @@ class MotionProblem:
             raise ConvergenceError("omega is not positive")
         extra = self.extra(u)
         try:
-            state = self.balance.at(x, omega, values)
+            state = self.balance.state(x, omega, values)
         except InputError as failure:
             # a coefficient has no value there
             raise NotFiniteError(str(failure)) from None
-        return MotionEvaluation(self, fed(state, self.zeta(extra)), extra)
+        return MotionEvaluation(self, fed(state, self.zeta(extra)) if extra.size else state, extra)
 
     def zeta(self, extra: Array) -> float:
         """See `Augmentation.zeta`."""

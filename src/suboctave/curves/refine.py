@@ -44,8 +44,8 @@ _NEWTON = NewtonOptions()
 #: how many times the distance of a bifurcation from where it lies with more harmonics is stated: they leave out less,
 #: but not nothing
 _COVERED = 1.2
-#: halvings of a step in which a bifurcation is looked for with more harmonics
-_HALVED = 16
+#: bracket, as a share of a step, in which a bifurcation is looked for with more harmonics
+_NARROW = 1e-5
 #: fractions of a step beyond its ends up to which more harmonics may move a bifurcation located in it
 _MOVED = 0.05
 #: move of a bifurcation by more harmonics, as a share of its parameter's value or range, that is not trusted
@@ -387,7 +387,7 @@ def _between(kind: BifurcationKind, curve: MotionProblem, a: Sample, b: Sample) 
     ends = _ends(curve, a, b)
     if ends is None or not kind.changed(*ends):
         return None
-    located = locate(kind, *ends, _NEWTON, _HALVED)
+    located = locate(kind, *ends, _NEWTON, _NARROW)
     return None if located is None else located.solution
 
 

@@ -11,7 +11,7 @@ import weakref
 from contextlib import suppress
 from dataclasses import replace
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -38,7 +38,7 @@ from suboctave.curves.trace import BranchPoint
 from suboctave.errors import ConvergenceError
 from suboctave.floquet.held import Grip, grip
 from suboctave.floquet.methods import Monodromy, StabilityMethod
-from suboctave.floquet.result import FloquetResult
+from suboctave.floquet.result import FloquetResult, Spectrum
 from suboctave.floquet.symmetric import symmetric_functions
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.energy import action_along, action_gradient
@@ -64,7 +64,8 @@ _CLOSELY = closely(NewtonOptions())
 class Sample:
     """A solved point; `place` is its arclength, `method` gives its multipliers."""
 
-    #: another sample, and the kinds whose tests have changed between the two (`monitors.changes`)
+    #: with another sample, and the kinds whose tests have changed between the two (`monitors.changes`)
+    comparison: Comparison | None = None
     compared: tuple[weakref.ref[Sample], tuple[Any, ...]] | None = None
 
     def __init__(self, point: CurvePoint, method: StabilityMethod = _MONODROMY) -> None:
@@ -76,6 +77,9 @@ class Sample:
         self.curve = point.curve
         self.evaluation = point.evaluation
         self.state: BalanceState = point.evaluation.state
+        #: by whether they are those of the completed motion
+        self._measures: dict[bool, Array] = {}
+        self._outside: dict[bool, int] = {}
 
     def at(self, point: CurvePoint) -> Sample:
         """Another point, with multipliers by the same method."""
@@ -99,11 +103,24 @@ class Sample:
 
     # ------------------------------------------------------------------------------------------ along responses
     @lazy
+    def _spectrum(self) -> Spectrum:
+        return self.method.spectrum(self.state)
+
+    @lazy
+    def standing(self) -> FloquetResult:
+        """Multipliers of the motion as it stands, or with more harmonics, see `floquet`."""
+        if self._at_most_harmonics:
+            known = self.floquet
+            if self.finer is not None:
+                return known
+        return self._spectrum.standing
+
+    @lazy
     def floquet(self) -> FloquetResult:
-        """Multipliers and their errors: of the motion with more harmonics where those of the curve are the most that it
-        may have and leave them unresolved.
+        """Multipliers and their errors, of the motion completed by what its harmonics leave out: of that with more
+        harmonics where those of the curve are the most that it may have and leave multipliers unresolved.
         """
-        result = self.method.along(self.state)
+        result = self._spectrum.completed
         if result.vagueness <= 1.0 or not self._at_most_harmonics:
             return result
         finer = resolved_beside(self.curve, self.state, self.point.tangent, result)
@@ -111,6 +128,16 @@ class Sample:
             return result.unknown()
         self.finer, result = finer
         return replace(result, checks={**result.checks, "harmonics": float(self.finer.harmonics)})
+
+    @property
+    def completed_is_known(self) -> bool:
+        """Whether the multipliers of the completed motion have been asked for: where tests compare these."""
+        return "floquet" in self.__dict__
+
+    @lazy
+    def resolved(self) -> bool:
+        """Whether the multipliers of the completed motion that may decide are known to a share of themselves."""
+        return self.floquet.resolved
 
     #: the motion with more harmonics that the multipliers are those of, None where they are the curve's own
     finer: FinerMotion | None = None
@@ -150,16 +177,22 @@ class Sample:
         """Whether the motion counts as rest, where its curve can tell."""
         return self.evaluation.at_rest
 
-    @lazy
-    def unstable(self) -> int:
+    def told(self, completed: bool) -> FloquetResult:
+        """Multipliers of the completed motion, or of the motion as it stands."""
+        return self.floquet if completed else self.standing
+
+    def outside(self, completed: bool) -> int:
         """Number of multipliers outside the unit circle, real ones on the side on which det J_0 and det J_half have
         them: the count and the tests of LP, BP and PD then change together.
         """
-        count = self.floquet.unstable
-        if not (self.at_rest or self.finer is not None):
-            for which, _ in measures.contradicted(self.floquet, self._integer_sign, self.half_sign):
-                count += 1 if abs(self.floquet.multipliers[which]) <= 1.0 else -1
-        return count
+        if completed not in self._outside:
+            known = self.told(completed)
+            count = known.unstable
+            if not (self.at_rest or self.finer is not None):
+                for which, _ in measures.contradicted(known, self._integer_sign, self.half_sign):
+                    count += 1 if abs(known.multipliers[which]) <= 1.0 else -1
+            self._outside[completed] = count
+        return self._outside[completed]
 
     @lazy
     def signs(self) -> tuple[bool, bool, bool]:
@@ -169,7 +202,7 @@ class Sample:
     @lazy
     def half_sign(self) -> float:
         """Sign of det J_half, or, where it is known with more harmonics, that of prod (1 + mu)."""
-        known = self.floquet
+        known = self.standing
         if self.finer is not None:
             return float(known.symmetric[0, 1])
         return Factor.of(self.state.half_jacobian).sign
@@ -221,23 +254,24 @@ class Sample:
                 beside.append(_turn(point_ahead(here, way, _CLOSELY)))
         return len(beside) > 1 and min(beside[1:]) <= _LEVEL
 
-    @lazy
-    def measures(self) -> Array:
+    def measures(self, completed: bool) -> Array:
         """turn, fold, double, torus of `bifurcation.measures`: signs and logarithms of their moduli, shape (2, 4).
 
         Where the parameter stands still those of the multipliers but the one at +1.
         """
-        point = self.point
-        tests = measures.measured(point.tangent, point.weights, point.curve.parameter, self.floquet)
-        if self.still:
-            tests[:, 0] = 1.0, math.log(_LEVEL)
-            tests[:, 1:] = symmetric_functions(_without(self.floquet.multipliers, 1.0 + 0.0j, several=False))
-        return tests
+        if completed not in self._measures:
+            point, known = self.point, self.told(completed)
+            tests = measures.measured(point.tangent, point.weights, point.curve.parameter, known)
+            if self.still:
+                tests[:, 0] = 1.0, math.log(_LEVEL)
+                tests[:, 1:] = symmetric_functions(_without(known.multipliers, 1.0 + 0.0j, several=False))
+            self._measures[completed] = tests
+        return self._measures[completed]
 
     @lazy
     def grip(self) -> Grip:
         """What elements may do to the vibrations of the structure."""
-        return grip(self.state, self.floquet.multipliers)
+        return grip(self.state, self.standing.multipliers)
 
     # ---------------------------------------------------------------------------------- along curves of bifurcations
     @property
@@ -469,3 +503,44 @@ def _frequencies(rows: int, size: int, mean: bool) -> float:
     k = np.arange(rows) // size
     f = (k + 1) // 2 if mean else k // 2 + 0.5
     return float(np.log(1.0 + f**2).sum())
+
+
+class Comparison(NamedTuple):
+    """What the multipliers of two neighbours say of the way between them.
+
+    first
+        The first of the two.
+    completed
+        Whether multipliers of completed motions are compared.
+    change
+        How many more are outside the unit circle at the second.
+    """
+
+    first: weakref.ref[Sample]
+    completed: bool
+    change: int
+
+
+def completed(*samples: Sample) -> bool:
+    """Whether tests compare multipliers of completed motions: where all are resolved. Elsewhere what completes motions
+    is as large as what it completes, and jumps from one to the next; those of motions as they stand are smooth.
+    """
+    for sample in samples:  # noqa: SIM110 - `all` takes three times as long
+        if not sample.resolved:
+            return False
+    return True
+
+
+def compare(a: Sample, b: Sample) -> Comparison:
+    """The comparison of two neighbours, which several ask for."""
+    known = b.comparison
+    if known is None or known.first() is not a:
+        which = completed(a, b)
+        b.comparison = known = Comparison(weakref.ref(a), which, b.outside(which) - a.outside(which))
+    return known
+
+
+def multipliers_of(*samples: Sample) -> list[ComplexArray]:
+    """Multipliers of neighbours, as tests compare them."""
+    which = completed(*samples)
+    return [sample.told(which).multipliers for sample in samples]

@@ -1,8 +1,9 @@
 """The methods that a user can ask for, as objects: `so.stability(orbit, method=...)` and `stability=...` of the verbs.
 
-A method takes one solved motion's equations and returns a `FloquetResult`. Along a curve it is asked twice: `along` for
-the multipliers that tests of neighbouring points compare, on every point that is tried, and `settled` for the verdict
-of a point that was accepted. For most methods that is the same; arbitration asks its witnesses only there.
+A method takes one solved motion's equations and returns a `FloquetResult`. Along a curve it is asked for a `spectrum`:
+the multipliers of the motion as it stands, and of the motion completed by what its harmonics leave out. Tests of
+neighbouring points compare these where they are resolved, and those of motions as they stand elsewhere. `settled` gives
+the verdict on a point that was accepted: arbitration asks its witnesses only there.
 
 Arbitration: where a multiplier lies closer to the unit circle than its error estimate, other methods follow, the
 cheapest first, until the verdict is clear. A multiplier lies where the discs (estimate, error) of the methods overlap:
@@ -24,8 +25,8 @@ import numpy as np
 from suboctave.arguments import checked
 from suboctave.errors import ConvergenceError, InputError, shortened, suggest
 from suboctave.floquet.hill import hill_beside, hill_multipliers
-from suboctave.floquet.monodromy import floquet_multipliers
-from suboctave.floquet.result import FloquetResult, written
+from suboctave.floquet.monodromy import MonodromySpectrum, floquet_multipliers
+from suboctave.floquet.result import FloquetResult, OneResult, Spectrum, written
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.interruption import check_time
 
@@ -59,6 +60,10 @@ class StabilityMethod(ABC):
         instead = floquet_multipliers(state)
         return replace(instead, note=f"{result.note}; multipliers of the monodromy matrix instead", stands_in=True)
 
+    def spectrum(self, state: BalanceState) -> Spectrum:
+        """Multipliers along a curve, of the motion as it stands and of the completed one, as they are asked for."""
+        return OneResult(self.along(state))
+
     def settled(self, state: BalanceState, result: FloquetResult) -> FloquetResult:
         """The verdict on a point of a curve, from the `result` of `along` there."""
         return result
@@ -74,6 +79,9 @@ class Monodromy(StabilityMethod):
 
     def multipliers(self, state: BalanceState) -> FloquetResult:
         return floquet_multipliers(state)
+
+    def spectrum(self, state: BalanceState) -> Spectrum:
+        return MonodromySpectrum(state)
 
 
 @checked(methods=False)
@@ -132,9 +140,14 @@ class Arbitration(StabilityMethod):
         """The monodromy matrix alone."""
         return floquet_multipliers(state)
 
+    def spectrum(self, state: BalanceState) -> Spectrum:
+        return MonodromySpectrum(state)
+
     def settled(self, state: BalanceState, result: FloquetResult) -> FloquetResult:
-        """The verdict, with witnesses where it is open and they cost little."""
-        return self._weighed(state, result, _UNBIDDEN)
+        """The verdict, with witnesses where it is open, they cost little, and the motion is resolved: they have as many
+        harmonics.
+        """
+        return self._weighed(state, result, _UNBIDDEN) if result.resolved else result
 
     def _weighed(self, state: BalanceState, result: FloquetResult, limit: float) -> FloquetResult:
         if result.decided:

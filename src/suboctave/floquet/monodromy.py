@@ -42,6 +42,7 @@ moves along it, which changes the phase alone, is left out.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import scipy.linalg
@@ -52,9 +53,9 @@ from suboctave.floquet.exponentials import TURNS, structure
 from suboctave.floquet.forms import form_of, forms_along
 from suboctave.floquet.left_out import Jumps, beyond, motions, of_the_rest, poles
 from suboctave.floquet.levels import Along, levels_of
-from suboctave.floquet.propagate import closed, march, multipliers_and_shifts, response, without_nearest
+from suboctave.floquet.propagate import closed, march, multipliers_and_shifts, own_values, response
 from suboctave.floquet.resolution import ACCURACY, divided, longest_rest, stretches, tolerated
-from suboctave.floquet.result import FloquetResult
+from suboctave.floquet.result import FloquetResult, Spectrum
 from suboctave.floquet.structural import with_structural_damping
 from suboctave.floquet.time_mesh import (
     ORDER,
@@ -88,7 +89,7 @@ _NO_PASSAGES = np.zeros((2, 0))
 _NO_MULTIPLIERS = np.empty(0, dtype=complex), np.empty(0)
 
 
-class _Linearised:
+class Linearised:
     """A motion as it stands, with stiffness, damping and unbalanced force of the elements along it, and one step of
     Newton's method from it.
 
@@ -112,8 +113,6 @@ class _Linearised:
         How far what is left out of the structure moves multipliers, see `propagate.multipliers_and_shifts`.
     before
         Monodromy matrix along the motion as it stands, (size, size).
-    standing
-        Its multipliers, (own,), known with those of the motion corrected.
     """
 
     def __init__(self, state: BalanceState) -> None:
@@ -260,9 +259,19 @@ class _Linearised:
 
     @lazy
     def _all_standing(self) -> ComplexArray:
-        """Multipliers along the motion as it stands, (size,), also of what stands in for fast blocks."""
-        real, imaginary, *_ = lapack.dgeev(self.before, 0, 0)
-        return real + 1j * imaginary
+        """Multipliers along the motion as it stands, (size,), those of what stands in for fast blocks last."""
+        vectors = self.own < self.size
+        real, imaginary, left, right, _ = lapack.dgeev(self.before, vectors, vectors)
+        mu: ComplexArray = real + 1j * imaginary
+        if not vectors:
+            return mu
+        own = own_values(imaginary, left, right, self.own)
+        return np.concatenate((mu[own], mu[~own]))
+
+    @property
+    def standing(self) -> ComplexArray:
+        """Multipliers along the motion as it stands, (own,)."""
+        return self._all_standing[: self.own]
 
     @property
     def rounding(self) -> float:
@@ -319,7 +328,6 @@ class _Linearised:
             real, imaginary, left, right, after, self.before, self.own, self.missing, self._doubt(change, share), mu,
             shift,
         )  # fmt: skip
-        self.standing = without_nearest(self._all_standing, mu[self.own :])
         mu, shift = mu[: self.own], shift[:, : self.own]
         # where multipliers meet on their way the first order tells too little: each has at least come from the nearest
         np.maximum(shift[0], np.abs(mu[:, None] - self.standing).min(axis=1), out=shift[0])
@@ -367,30 +375,54 @@ _TOGETHER = 3.0
 _MOST_TURNS = 1e15
 
 
+class MonodromySpectrum(Spectrum):
+    """Multipliers of a solved motion by the monodromy matrix, over the motion's own period (`nu` load periods)."""
+
+    def __init__(self, state: BalanceState) -> None:
+        check_time()
+        self._motion = Linearised(state)
+        self._structural = not state.balance.system.structural.zero
+
+    @lazy
+    def standing(self) -> FloquetResult:
+        return self.completed if self._structural else _result(self._motion, _as_it_stands)
+
+    @lazy
+    def completed(self) -> FloquetResult:
+        result = _result(self._motion, _with_states)
+        return with_structural_damping(self._motion.state, result) if self._structural else result
+
+
 def floquet_multipliers(state: BalanceState) -> FloquetResult:
     """Multipliers, error estimates and verdict of a solved motion, over the motion's own period (`nu` load periods)."""
-    result = _of_equation(state)
-    return result if state.balance.system.structural.zero else with_structural_damping(state, result)
+    return MonodromySpectrum(state).completed
 
 
-def _of_equation(state: BalanceState) -> FloquetResult:
-    """Of the linear part's equation of motion."""
-    check_time()
-    motion = _Linearised(state)
+def _result(motion: Linearised, with_states: Callable[[Linearised], tuple[ComplexArray, Array]]) -> FloquetResult:
+    """Of the linear part's equation of motion; `with_states` gives multipliers and errors of the blocks with states."""
     mu, errors = motion.others()
     if not np.isfinite(motion.before).all():
-        return _no_numbers(state, motion.size + len(mu))
+        return _no_numbers(motion.state, motion.size + len(mu))
     if motion.own:
-        own, own_errors = _with_states(motion)
-        if not len(mu):
-            return FloquetResult(own, own_errors)
+        own, own_errors = with_states(motion)
         mu, errors = np.concatenate((own, mu)), np.concatenate((own_errors, errors))
     order = np.argsort(-np.abs(mu), kind="stable")
     return FloquetResult(mu[order], errors[order])
 
 
-def _with_states(motion: _Linearised) -> tuple[ComplexArray, Array]:
-    """Multipliers and errors of the blocks that have states."""
+def _as_it_stands(motion: Linearised) -> tuple[ComplexArray, Array]:
+    """Multipliers of the blocks that have states along the motion as it stands, with the errors of computing them."""
+    mu = motion.standing
+    return mu, np.full(len(mu), _least(motion) * max(1.0, float(np.abs(mu).max())))
+
+
+def _least(motion: Linearised) -> float:
+    """Errors of computing multipliers, relative to the largest."""
+    return (ACCURACY if motion.coupled else 0.0) + motion.rounding
+
+
+def _with_states(motion: Linearised) -> tuple[ComplexArray, Array]:
+    """Multipliers and errors of the blocks that have states, of the motion with what its harmonics leave out."""
     mu, shift, share = motion.multipliers(1.0)
     largest = max(1.0, abs(mu[0]))
     # that nearest to +1 is the motion's as it stands: a correction may have carried it off, to meet another one
@@ -401,8 +433,7 @@ def _with_states(motion: _Linearised) -> tuple[ComplexArray, Array]:
         mu, shift, share = _beside_fold(motion, gap, moved)
     # where the correction had to be cut, the motion is not near enough to a true one to say much
     cut = 1.0 / share - 1.0 if share > 0.0 else math.inf
-    least = (ACCURACY if motion.coupled else 0.0) + motion.rounding + cut
-    return mu, shift[0] * (1.0 + cut) + shift[1] + least * largest
+    return mu, shift[0] * (1.0 + cut) + shift[1] + (_least(motion) + cut) * largest
 
 
 def _no_numbers(state: BalanceState, count: int) -> FloquetResult:
@@ -415,7 +446,7 @@ def _no_numbers(state: BalanceState, count: int) -> FloquetResult:
     return FloquetResult.inapplicable(count, "monodromy", "The linearised motion is not finite")
 
 
-def _beside_fold(motion: _Linearised, gap: float, moved: float) -> tuple[ComplexArray, Array, float]:
+def _beside_fold(motion: Linearised, gap: float, moved: float) -> tuple[ComplexArray, Array, float]:
     """Multipliers, shifts and share where a correction may have no meaning, as it does at a limit point.
 
     gap: distance to +1 of the multiplier nearest to it along the motion as it stands; moved: its shift by the whole

@@ -429,17 +429,3 @@ def multipliers_and_shifts(real, imaginary, left, right, phi, before, own, missi
             for part in range(2):
                 moved[part, k - 1], moved[part, k] = moved[part, k], moved[part, k - 1]
             k -= 1
-
-
-@kernel()
-def without_nearest(mu, others):
-    """Numbers (N,) without those that lie nearest to others (M,), one for each, (N - M,)."""
-    kept = np.ones(mu.shape[0], dtype=np.bool_)
-    for other in others:
-        nearest = -1
-        for i in range(mu.shape[0]):
-            if kept[i] and (nearest < 0 or abs(mu[i] - other) < abs(mu[nearest] - other)):
-                nearest = i
-        if nearest >= 0:
-            kept[nearest] = False
-    return mu[kept]

@@ -143,6 +143,11 @@ class FloquetResult:
         """One of every set of equal multipliers: see `floquet.symmetric`."""
         return distinct(self.multipliers)
 
+    @lazy
+    def repeated(self) -> bool:
+        """Whether several multipliers are equal."""
+        return len(self.distinct) != len(self.multipliers)
+
     @property
     def open(self) -> np.ndarray:
         """Which multipliers lie within their errors of the unit circle, (2 n,)."""
@@ -197,6 +202,33 @@ class FloquetResult:
         more = f", ... ({count} in all)" if count > 4 else ""
         note = f". {self.note}" if self.note else ""
         return f"FloquetResult: {verdict}{doubt} ({self.method}). Multipliers {', '.join(shown)}{more}{note}"
+
+
+class Spectrum:
+    """Multipliers of a motion on a curve, in the two ways in which they are used.
+
+    standing
+        Those of the motion as it stands, with the errors of computing them: smooth along the curve however few the
+        harmonics are.
+    completed
+        Those of the motion with what its harmonics leave out, to first order, and how far each may be off: what is said
+        of the motion.
+    """
+
+    standing: FloquetResult
+    completed: FloquetResult
+
+
+@dataclass(frozen=True, eq=False)
+class OneResult(Spectrum):
+    """Of a method that has one result."""
+
+    completed: FloquetResult
+
+    @property
+    def standing(self) -> FloquetResult:  # type: ignore[override]
+        """The same."""
+        return self.completed
 
 
 def written(mu: complex, error: float) -> str:

@@ -20,6 +20,7 @@ for others to say.
 from __future__ import annotations
 
 import cmath
+import math
 import weakref
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -37,7 +38,7 @@ from suboctave.continuation.point import CurvePoint, between, point_between
 from suboctave.continuation.problem import Array
 from suboctave.curves.events.formulation import BORDERED, Formulation
 from suboctave.curves.events.locate import Guess, Singular, locate_branch_point, locate_multiple
-from suboctave.curves.sample import Sample
+from suboctave.curves.sample import Sample, compare, multipliers_of
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.perturbation import Kind
@@ -83,7 +84,7 @@ class BifurcationKind(ABC):
         return 0.0
 
     @staticmethod
-    def of_its_sort(sample: Sample) -> ComplexArray:
+    def of_its_sort(mu: ComplexArray) -> ComplexArray:
         """The multipliers that could pass the circle where those of the kind do; none unless several may together."""
         return np.zeros(0, dtype=complex)
 
@@ -136,9 +137,8 @@ class BranchPoint(BifurcationKind):
         return _zero(_nearest(a, 1.0), _nearest(b, 1.0))
 
     @staticmethod
-    def of_its_sort(sample: Sample) -> ComplexArray:
-        mu = _real(sample)
-        return mu[mu.real > 0.0]
+    def of_its_sort(mu: ComplexArray) -> ComplexArray:
+        return _real(mu[mu.real > 0.0])
 
     def solve(self, guess: Guess) -> Singular:
         return locate_branch_point(guess)
@@ -157,9 +157,8 @@ class PeriodDoubling(BifurcationKind):
         return _zero(_nearest(a, -1.0), _nearest(b, -1.0))
 
     @staticmethod
-    def of_its_sort(sample: Sample) -> ComplexArray:
-        mu = _real(sample)
-        return mu[mu.real < 0.0]
+    def of_its_sort(mu: ComplexArray) -> ComplexArray:
+        return _real(mu[mu.real < 0.0])
 
 
 class NeimarkSacker(BifurcationKind):
@@ -179,11 +178,12 @@ class NeimarkSacker(BifurcationKind):
         real = sum(kind.multiplicity for kind in kinds)
         # one multiplier passes +1 at a limit point or a branch point, or at both in one
         real -= BRANCH_POINT in kinds and LIMIT_POINT in kinds
-        return crossing_pair(a.floquet.multipliers, b.floquet.multipliers, b.unstable - a.unstable, real)
+        before, behind = multipliers_of(a, b)
+        return crossing_pair(before, behind, compare(a, b).change, real)
 
     @staticmethod
-    def of_its_sort(sample: Sample) -> ComplexArray:
-        return upper(sample.floquet.multipliers)
+    def of_its_sort(mu: ComplexArray) -> ComplexArray:
+        return upper(mu)
 
     def fraction(self, a: Sample, b: Sample) -> float:
         pair = self.crossing(a, b)
@@ -191,7 +191,7 @@ class NeimarkSacker(BifurcationKind):
 
     def kappa(self, sample: Sample) -> float:
         """From the complex multiplier closest to the unit circle: `mu = exp(i kappa T)`."""
-        pairs = upper(sample.floquet.multipliers)
+        pairs = upper(*multipliers_of(sample))
         if not len(pairs):
             raise ConvergenceError("no complex pair of multipliers here")
         mu = min(pairs, key=lambda m: abs(abs(m) - 1.0))
@@ -219,7 +219,7 @@ class PairAmong(NeimarkSacker):
         self.rank, self.count = rank, count
 
     def _pair(self, sample: Sample) -> complex:
-        pairs = upper(sample.floquet.multipliers)
+        pairs = upper(*multipliers_of(sample))
         nearest = pairs[np.argsort(np.abs(np.abs(pairs) - 1.0), kind="stable")[: self.count]]
         if len(nearest) < self.count:
             raise ConvergenceError("no complex pair of multipliers here")
@@ -288,13 +288,14 @@ def solved_by(formulation: Formulation) -> dict[str, BifurcationKind]:
 
 def changes(a: Sample, b: Sample) -> tuple[BifurcationKind, ...]:
     """The kinds whose tests have changed between two neighbours, in the order in which they are looked for."""
-    if a.signs == b.signs and abs(a.unstable - b.unstable) < 2:
-        return ()
     # several ask this of the same two
     if b.compared is not None and b.compared[0]() is a:
         return b.compared[1]
-    kinds = _passing_one(a, b)
-    if NEIMARK_SACKER.crossing(a, b) is not None:
+    kinds: list[BifurcationKind] = []
+    eventful = a.signs != b.signs or abs(compare(a, b).change) > 1
+    if eventful:
+        kinds = _passing_one(a, b)
+    if eventful and NEIMARK_SACKER.crossing(a, b) is not None:
         together, apart = len(_together(NEIMARK_SACKER, a, b)[0]), _pairs_within(a, b)
         alone = together > 1 or apart < 2
         kinds += [multiple(NEIMARK_SACKER, together)] if alone else [among(rank, apart) for rank in range(apart)]
@@ -316,7 +317,7 @@ def _pairs_within(a: Sample, b: Sample) -> int:
     """How many pairs cross the circle within the shortest interval, 0 in longer ones, which are cut."""
     if b.place - a.place > _SHORTEST:
         return 0
-    outside = [int(np.count_nonzero(np.abs(upper(sample.floquet.multipliers)) > 1.0)) for sample in (a, b)]
+    outside = [int(np.count_nonzero(np.abs(upper(mu)) > 1.0)) for mu in multipliers_of(a, b)]
     return abs(outside[1] - outside[0])
 
 
@@ -324,7 +325,7 @@ def _together(kind: BifurcationKind, a: Sample, b: Sample) -> tuple[Array, Array
     """By how much the multipliers that pass the circle together between two neighbours, two of them at least, lie
     outside of it at both; they must be alike before and behind. Empty where there are none.
     """
-    sorts = [kind.of_its_sort(sample) for sample in (a, b)]
+    sorts = [kind.of_its_sort(mu) for mu in multipliers_of(a, b)]
     outside = [mu[np.abs(mu) > 1.0] for mu in sorts]
     several = abs(len(outside[0]) - len(outside[1]))
     if several < 2:
@@ -353,15 +354,14 @@ def _zero(a: float, b: float) -> float:
     return min(0.98, max(0.02, a / (a - b)))
 
 
-def _real(sample: Sample) -> ComplexArray:
+def _real(mu: ComplexArray) -> ComplexArray:
     """The real multipliers."""
-    mu = sample.floquet.multipliers
     return mu[np.abs(mu.imag) < 1e-7 * np.abs(mu)]
 
 
 def _nearest(sample: Sample, target: float) -> float:
     """Distance of the real multiplier nearest to a target from it, signed; nan if there is none."""
-    real = _real(sample).real
+    real = _real(*multipliers_of(sample)).real
     return float(real[np.argmin(np.abs(real - target))] - target) if real.size else float("nan")
 
 
@@ -370,8 +370,9 @@ _SLACK = 1e-7
 #: the same before the first point of a curve, which may be the bifurcation as its multipliers tell, not its harmonics,
 #: and beyond ends at which multipliers, if these tell of the kind, leave it open on which side they lie
 _BEFORE = 1e-2
-#: bisections between motions with more harmonics than their curve
-_OF_FINER = 6
+#: shares of a step: the bracket that is the answer, that between motions with more harmonics than their curve, and how
+#: much narrower it has to be to solve again from there
+NARROWEST, _OF_FINER, _NARROWER = 1e-10, 0.02, 0.06
 #: corrections of a place on a step, at most, and one that settles it, as a share of the step
 _ROUNDS, _SETTLED = 20, 1e-12
 
@@ -395,17 +396,17 @@ def locate(
     a: Sample,
     b: Sample,
     newton: NewtonOptions,
-    bisections: int = 34,
+    narrowest: float = NARROWEST,
     begins: bool = False,
 ) -> Located | None:
     """Locate a bifurcation of a kind whose test changed between two neighbours; None if it turns out to be none.
 
-    After so many bisections the bracket is taken for the answer. `begins`: whether the curve begins with the first
-    neighbour; what lies right before it then belongs to no other step.
+    A bracket as narrow as that, as a share of the step, is taken for the answer. `begins`: whether the curve begins
+    with the first neighbour; what lies right before it then belongs to no other step.
     """
     # where tests are those of motions with more harmonics, halving their brackets does not lead to what fewer have
     finer = a.finer is not None or b.finer is not None
-    found = _located(kind, a, b, newton, min(bisections, _OF_FINER) if finer else bisections, begins)
+    found = _located(kind, a, b, newton, max(narrowest, _OF_FINER) if finer else narrowest, begins)
     missed = found is None or found.solution is None
     return (_beside(kind, a, b) or found) if missed and (kind.counted or finer) else found
 
@@ -429,20 +430,26 @@ def _beside(kind: BifurcationKind, a: Sample, b: Sample) -> Located | None:
 
 
 def _located(
-    kind: BifurcationKind, a: Sample, b: Sample, newton: NewtonOptions, bisections: int, begins: bool
+    kind: BifurcationKind, a: Sample, b: Sample, newton: NewtonOptions, narrowest: float, begins: bool
 ) -> Located | None:
-    """What of it lies between two neighbours."""
+    """What of it lies between two neighbours: its bracket is made narrower by secants of the test, and it is solved for
+    at first, and again whenever that has helped much. What is solved for and what the test shows lie as far apart as
+    the harmonics left out make it: within a bracket that is wide enough they are the same.
+    """
     low, high = 0.0, 1.0
     at_low, at_high = a, b
     before, behind = (_BEFORE if kind.counted and not end.floquet.decided else _SLACK for end in (a, b))
+    tried, wider = math.inf, math.inf
     # one beyond an end that leaves it open may be another one, which leads back: what lies inside comes first
     beyond: Located | None = None
-    for depth in range(bisections):
-        if beyond is not None and (high <= before or low >= 1.0 - behind):
-            return beyond
+    while beyond is None or (before < high and low < 1.0 - behind):
+        width = high - low
+        if width <= narrowest:
+            break
         share = kind.fraction(at_low, at_high)
         nearer = at_low if share < 0.5 else at_high
-        if depth % 3 == 0:
+        if width <= _NARROWER * tried:
+            tried = width
             # near a grazing the curve bends within a sliver of the step: only its own ends tell where it runs
             attempt = solved_between(kind, at_low, at_high, share, nearer)
             # what lies beyond an end belongs to the next step, and would be missed there if it were taken for the one
@@ -454,8 +461,10 @@ def _located(
                     if begins or -_SLACK <= place <= 1.0 + _SLACK:
                         return found
                     beyond = beyond or found
-        middle = None
-        for part in (0.5, 0.4, 0.65):
+        # where secants make it no narrower it is halved
+        first = share if width <= 0.5 * wider else 0.5
+        wider, middle = width, None
+        for part in (first, 0.4, 0.65):
             try:
                 at = low + part * (high - low)
                 middle = b.at(point_between(a.point, b.point, at, newton, exactly=True))

@@ -81,7 +81,7 @@ class StepWatch(Steps):
         return not p.curve.alike(q.curve) or super().parted(p, q)
 
     def functions(self, sample: Sample) -> Array:
-        """The functions of the tests that are smooth along the curve: see `Interior.measures`."""
+        """The functions of the tests that are smooth along the curve: see `Interior.tests`."""
         known = self._functions.get(sample)
         if known is None:
             known = self._functions[sample] = np.array([test.smooth(sample) for test in self.tests]).T
@@ -134,8 +134,8 @@ class _Step(Interior):
 
         return any(turn(p, q) and self.steps.grazes(p, q) for p, q in itertools.pairwise(self.inside))
 
-    def measures(self, sample: Sample) -> Array:
-        return self.steps.functions(sample)
+    def tests(self, stencil: Sequence[Sample]) -> list[Array]:
+        return [self.steps.functions(one) for one in stencil]
 
     def relative(self, stencil: Sequence[Sample], k: int) -> Iterator[Array]:
         """See `Interior.relative`: with the least factor of `torus`."""
