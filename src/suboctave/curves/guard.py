@@ -193,9 +193,8 @@ class GuardedStep(Interior):
         crossing = self._look_for_crossing(p, q)
         if self.refused:
             return None
-        change = compare(p, q).change
-        eventful = change != 0 or bool(changes(p, q))
-        doubt = self._doubt_at_event(p, q, change, crossing) if eventful else None
+        eventful = compare(p, q).change != 0 or bool(changes(p, q))
+        doubt = self._doubt_at_event(p, q, crossing) if eventful else None
         if doubt is not None:
             return doubt
         doubt = super().doubt(p, q)
@@ -204,12 +203,16 @@ class GuardedStep(Interior):
         # right beside a branch point at which the curve turns the multiplier at +1 is known up to its error only
         return None if doubt is not None and doubt[1] == _RETURNS and h <= _EXAMINED and self.turned else doubt
 
-    def _doubt_at_event(self, p: Sample, q: Sample, change: int, crossing: Crossing | None) -> tuple[float, str] | None:
+    def _doubt_at_event(self, p: Sample, q: Sample, crossing: Crossing | None) -> tuple[float, str] | None:
         """The same where something has changed: the number of unstable multipliers, or a test."""
         if not all(self._confirmed(kind, p, q) for kind in changes(p, q) if kind.multiplicity > 1):
             return 0.5, _TOGETHER
         if not _explained(p, q):
-            return 0.5, f"the number of unstable multipliers changes by {change}, which no bifurcation there explains"
+            before, now = (one.outside(completed(p, q)) for one in (p, q))
+            return 0.5, (
+                f"the number of unstable multipliers changes from {before} to {now}, which no bifurcation there "
+                "explains"
+            )
         if self._mixed(p, q):
             return 0.5, "a pair of multipliers may cross the unit circle together with a real one"
         turns = [self.measures(one, completed(p, q))[0, 0] for one in (p, q)]
