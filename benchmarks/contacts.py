@@ -69,8 +69,6 @@ CHAINS = {
 def run(name: str, kind: str, contacts: list[int], harmonics: int | str, seconds: float) -> None:
     """Print a line for every number of contacts."""
     chain, first = CHAINS[name], 0.0
-    warm, _ = chain.system(kind, 1)
-    so.periodic_orbit(warm, 0.5)
     so.frequency_response(*chain.system(kind, 1), harmonics=harmonics, max_step=0.3, seconds=seconds)
     for count in contacts:
         if count * chain.apart > chain.masses:
