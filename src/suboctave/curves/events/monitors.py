@@ -443,12 +443,9 @@ def _located(
     # one beyond an end that leaves it open may be another one, which leads back: what lies inside comes first
     beyond: Located | None = None
     while beyond is None or (before < high and low < 1.0 - behind):
-        width = high - low
-        if width <= narrowest:
-            break
-        share = kind.fraction(at_low, at_high)
-        nearer = at_low if share < 0.5 else at_high
-        if width <= _NARROWER * tried:
+        width, share = high - low, kind.fraction(at_low, at_high)
+        nearer, last = at_low if share < 0.5 else at_high, width <= narrowest
+        if narrowest < 1.0 and (last or width <= _NARROWER * tried):
             tried = width
             # near a grazing the curve bends within a sliver of the step: only its own ends tell where it runs
             attempt = solved_between(kind, at_low, at_high, share, nearer)
@@ -461,6 +458,8 @@ def _located(
                     if begins or -_SLACK <= place <= 1.0 + _SLACK:
                         return found
                     beyond = beyond or found
+        if last:
+            break
         # where secants make it no narrower it is halved
         first = share if width <= 0.5 * wider else 0.5
         wider, middle = width, None
