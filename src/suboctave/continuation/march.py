@@ -133,7 +133,7 @@ class Place:
         w, own = new.weights, self.point
         step = distance(new.u, point.u, w)
         here, reach = new.parameter, 1.5 * step / w[new.curve.parameter]
-        if not any(abs(here - value) <= reach for value in self._values):
+        if all(abs(here - value) > reach for value in self._values):
             return
         if self._images is None or self._images[0] is not new.curve:
             self._images = (new.curve, new.curve.images(new.curve.transfer(own.u, own.curve)))

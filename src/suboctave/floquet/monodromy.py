@@ -55,7 +55,7 @@ from suboctave.floquet.left_out import Jumps, beyond, motions, of_the_rest, pole
 from suboctave.floquet.levels import Along, levels_of
 from suboctave.floquet.propagate import closed, march, multipliers_and_shifts, own_values, response
 from suboctave.floquet.resolution import ACCURACY, divided, longest_rest, stretches, tolerated
-from suboctave.floquet.result import FloquetResult, Spectrum
+from suboctave.floquet.result import FloquetResult
 from suboctave.floquet.structural import with_structural_damping
 from suboctave.floquet.time_mesh import (
     ORDER,
@@ -375,8 +375,8 @@ _TOGETHER = 3.0
 _MOST_TURNS = 1e15
 
 
-class MonodromySpectrum(Spectrum):
-    """Multipliers of a solved motion by the monodromy matrix, over the motion's own period (`nu` load periods)."""
+class MonodromySpectrum:
+    """A `Spectrum` of a solved motion by the monodromy matrix, over the motion's own period (`nu` load periods)."""
 
     def __init__(self, state: BalanceState) -> None:
         check_time()

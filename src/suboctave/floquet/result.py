@@ -6,6 +6,7 @@ import cmath
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -204,7 +205,7 @@ class FloquetResult:
         return f"FloquetResult: {verdict}{doubt} ({self.method}). Multipliers {', '.join(shown)}{more}{note}"
 
 
-class Spectrum:
+class Spectrum(Protocol):
     """Multipliers of a motion on a curve, in the two ways in which they are used.
 
     standing
@@ -215,18 +216,21 @@ class Spectrum:
         of the motion.
     """
 
-    standing: FloquetResult
-    completed: FloquetResult
+    @property
+    def standing(self) -> FloquetResult: ...
+
+    @property
+    def completed(self) -> FloquetResult: ...
 
 
 @dataclass(frozen=True, eq=False)
-class OneResult(Spectrum):
+class OneResult:
     """Of a method that has one result."""
 
     completed: FloquetResult
 
     @property
-    def standing(self) -> FloquetResult:  # type: ignore[override]
+    def standing(self) -> FloquetResult:
         """The same."""
         return self.completed
 

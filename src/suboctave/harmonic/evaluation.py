@@ -402,10 +402,8 @@ class BalanceState:
 
     def residual_by(self, name: str) -> Array:
         """R differentiated by "omega" or a parameter, shape (dimension,)."""
-        block, balance = self.linear_by(name), self.balance
+        block = self.linear_by(name)
         result = np.zeros(self.x.shape) if block is None else apply_blocks(block, self.x)
-        if name == "omega" and balance.steady and name not in balance.load_names:
-            return result.ravel()
         change = self.unbalanced_by(name)
         return (result if change is None else result + change).ravel()
 
