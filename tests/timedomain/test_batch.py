@@ -8,6 +8,7 @@ from slow import slow
 
 import suboctave as so
 from suboctave.errors import ConvergenceError, FunctionError, InputError
+from suboctave.model.elements.coupled import as_coupled
 from suboctave.timedomain import integrate
 from suboctave.timedomain.flow import Flow
 
@@ -91,6 +92,28 @@ def states_for(system, count=3):
 
 def reference(system, state, periods, omega=TIMED, values=None):
     return integrate(system, state, (0.0, periods * 2 * np.pi / omega), omega, values, rtol=1e-12).end
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_a_law_at_one_instant_is_that_of_arrays(name):
+    system, rng = SYSTEMS[name], np.random.default_rng(3)
+    for element in system.elements:
+        c = element.coefficient_values(system.parameters)
+        form = element.batch_form(c)
+        if form.has_code:
+            q, theta = rng.normal(size=(form.inputs * (1 + form.moving), 12)), rng.uniform(0.0, 6.0, 12)
+            f, f_q = as_coupled(element).tangent(q, theta, c)
+            numbers = form.numbers(c, element.sampling(c))
+            for k in range(12):
+                force, slopes = form.one_instant(*q[:, k].tolist(), theta[k], numbers)
+                np.testing.assert_allclose([force, *slopes], [f[k], *f_q[:, k]], rtol=1e-12, atol=1e-14)
+
+
+@pytest.mark.parametrize("text", ["sqrt(x)", "abs(x**0.5)", "1/x", "exp(-800*x)"])
+def test_where_a_law_has_no_real_number_the_integration_says_so(text):
+    system = one(so.Expression(0, text))
+    with pytest.raises(so.ConvergenceError, match="or a force is not finite"):
+        integrate(system, [0.0 if "/" in text else -1.0, 0.0], (0.0, 5.0), TIMED)
 
 
 @pytest.mark.parametrize("name", EACH)

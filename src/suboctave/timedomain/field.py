@@ -29,6 +29,8 @@ __all__ = ["Array", "Field", "Switch", "default_lengths", "scaled_field"]
 
 Array = NDArray[np.float64]
 RightHandSide = Callable[[float, Array], Array]
+#: force and slopes of a law for the states that it reads, at an instant
+LawAtOneInstant = Callable[[list[float], float], tuple[float, list[float]]]
 
 #: degrees of freedom up to which a system that is no projected structure is stepped
 FEW = 40
@@ -128,6 +130,7 @@ class Field:
         self._push = np.hstack([np.zeros_like(push), push])
         #: of every law: its tangent, its coefficients, which of the columns read are its own
         self.laws: list[tuple[Callable[..., tuple[Array, Array]], Array, slice]] = []
+        self._one_instant: list[LawAtOneInstant] = []
         read, act = [np.zeros((0, 2 * n))], [np.zeros((0, 2 * n))]
         columns = 0
         for element, c in self.smooth:
@@ -140,6 +143,7 @@ class Field:
             act.append(np.concatenate([np.zeros(n), -velocity_per_force @ element.direction(n)])[None])
             first, columns = columns, columns + len(inputs) * (1 + element.depends_on_velocity)
             self.laws.append((law.tangent, c, slice(first, columns)))
+            self._one_instant.append(_one_instant(element, c))
         #: what the laws read, as columns (2n, Q), and the rates that a unit of their forces makes, (L, 2n)
         self.read, self.act = np.ascontiguousarray(np.vstack(read).T), np.vstack(act)
 
@@ -202,9 +206,11 @@ class Field:
     def right_hand_side(self, active: NDArray[np.bool_], slope: bool = False) -> RightHandSide:
         """The rate of the stacked rows per unit of `tau`, contacts frozen as in `active` (one flag per switch)."""
         matrix, constant = self._matrices(active)
-        m, laws, read, act = 2 * self.n, self.laws, self.read, self.act
-        loads, amplitude, push = self.loads, self.loads.amplitude, self._push
-        harmonic, phase = loads.harmonic, loads.phase
+        m, read, act = 2 * self.n, self.read, self.act
+        laws = [(law, own) for law, (_, _, own) in zip(self._one_instant, self.laws, strict=True)]
+        forces, slopes = np.zeros(len(laws)), np.zeros((read.shape[1], len(laws)))
+        loads, push = self.loads, self._push
+        harmonic, phase, pushed = loads.harmonic, loads.phase, loads.amplitude[:, None] * push
         relative = self.reference / self.omega
 
         def rate(tau: float, y: Array) -> Array:
@@ -213,18 +219,18 @@ class Field:
             first = out[0]
             angle = harmonic * tau + phase
             cosine = np.cos(angle)
-            first += constant + (amplitude * cosine) @ push
+            first += constant + cosine @ pushed
             if laws:
-                q, instant = rows @ read, np.array([tau])
-                force = np.empty((len(rows), len(laws)))
-                for i, (law, c, own) in enumerate(laws):
-                    f, f_q = law(q[0, own, None], instant, c)
-                    force[:, i] = q[:, own] @ f_q[:, 0]
-                    force[0, i] = f[0]
+                q = rows @ read
+                states = q[0].tolist()
+                for i, (law, own) in enumerate(laws):
+                    forces[i], slopes[own, i] = law(states[own], tau)
+                force = q @ slopes
+                force[0] = forces
                 out += force @ act
             if slope:
                 # F_tau = F / omega, so d F_tau / d(omega/W) = -(W/omega) F_tau + W (1/omega) dF/d omega
-                change = loads.amplitude_slope * cosine - amplitude * loads.phase_slope * np.sin(angle)
+                change = loads.amplitude_slope * cosine - loads.amplitude * loads.phase_slope * np.sin(angle)
                 out[-1] += self.reference * (change @ push) - relative * first
             return out.ravel()
 
@@ -252,6 +258,27 @@ class Field:
             for i in tied:
                 active[i] = approach[i] > 0.0 if abs(approach[i]) > slow[i] else turn[i] > 0.0
         return active
+
+
+def _one_instant(element: BaseElement, c: Array) -> LawAtOneInstant:
+    """A law with its coefficients, at one instant."""
+    tangent, form = as_coupled(element).tangent, element.batch_form(c)
+
+    def by_arrays(states: list[float], tau: float) -> tuple[float, list[float]]:
+        f, f_q = tangent(np.array(states)[:, None], np.array([tau]), c)
+        return float(f[0]), f_q[:, 0].tolist()
+
+    if not form.has_code:
+        return by_arrays
+    law, numbers = form.one_instant, form.numbers(c, element.sampling(c))
+
+    def by_numbers(states: list[float], tau: float) -> tuple[float, list[float]]:
+        try:
+            return law(*states, tau, numbers)
+        except (ArithmeticError, ValueError, TypeError):  # no real number, or infinite: arrays go on with that
+            return by_arrays(states, tau)
+
+    return by_numbers
 
 
 def default_lengths(field: Field, motion: Array) -> Array:

@@ -69,12 +69,17 @@ class Passage:
     states: list[Array] = field(default_factory=list)
 
 
-def _solver(rhs: Any, begin: float, y: Array, end: float, rtol: float, atol: float, first: float | None) -> Any:
+def _solver(
+    model: Field, rhs: Any, begin: float, y: Array, end: float, rtol: float, atol: float, first: float | None
+) -> Any:
     if first is not None:
         first = min(first, end - begin)
     if isinstance(rhs, ExactRate):
         return ExactSolver(rhs, begin, y, end, rtol, first)
-    return scipy.integrate.DOP853(rhs, begin, y, end, rtol=rtol, atol=atol, first_step=first)
+    solver = scipy.integrate.DOP853(rhs, begin, y, end, rtol=rtol, atol=atol, first_step=first)
+    if not np.all(np.isfinite(solver.f)):  # no step is short enough, and none is ever taken
+        raise _stopped(model, begin, y[: 2 * model.n], "The rate is not finite")
+    return solver
 
 
 def _zero(function: Callable[[float], float], a: float, b: float) -> float:
@@ -87,16 +92,20 @@ def _step(solver: DOP853, model: Field) -> None:
     message = solver.step()
     state = _states(solver, model)[1]
     if solver.status == "failed" or not np.all(np.isfinite(state)):
-        raise ConvergenceError(
-            f"the integration stopped at t = {solver.t / model.omega:.6g} (omega = {model.omega:.6g}): {message}. "
-            f"The motion grows without bound (largest scaled component {np.max(np.abs(state)):.3g}), or a force is not "
-            "finite. Check the sign of the damping, the forces over this range, and the state at the start"
-        )
+        raise _stopped(model, solver.t, state, message)
+
+
+def _stopped(model: Field, tau: float, state: Array, reason: str | None) -> ConvergenceError:
+    return ConvergenceError(
+        f"the integration stopped at t = {tau / model.omega:.6g} (omega = {model.omega:.6g}): {reason}. "
+        f"The motion grows without bound (largest scaled component {np.max(np.abs(state)):.3g}), or a force is not "
+        "finite. Check the sign of the damping, the forces over this range, and the state at the start"
+    )
 
 
 def reach(model: Field, rhs: Any, begin: float, y: Array, end: float, rtol: float, atol: float) -> Array:
     """The stacked state at `end`, contacts frozen on the way, in one step if the tolerances allow it."""
-    solver = _solver(rhs, begin, y, end, rtol, atol, end - begin)
+    solver = _solver(model, rhs, begin, y, end, rtol, atol, end - begin)
     while solver.status == "running":
         _step(solver, model)
     return np.asarray(solver.y, dtype=float)
@@ -230,7 +239,7 @@ def advance(
     tau, length = begin, None
     while tau < end:
         rhs = exact_rate(model, watch.active, slope)
-        solver = _solver(rhs, tau, y, end, rtol, atol, length)
+        solver = _solver(model, rhs, tau, y, end, rtol, atol, length)
         while solver.status == "running":
             _step(solver, model)
             change = watch.first_change(solver) if len(watch.active) else None

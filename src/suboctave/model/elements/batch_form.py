@@ -7,6 +7,7 @@ corner. A law without a batch form of its own is called back, which is slower by
 
 from __future__ import annotations
 
+import functools
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
@@ -19,6 +20,8 @@ from numpy.typing import NDArray
 from suboctave.model.elements.smoothness import PiecewiseLinear, PolynomialSampling, Sampling, SharpSampling, levels
 
 Array = NDArray[np.float64]
+#: states, phase and numbers of a law to its force and the derivatives by the states
+OneInstant = Callable[..., tuple[float, list[float]]]
 
 
 @dataclass(frozen=True)
@@ -52,6 +55,9 @@ class BatchForm(ABC):
     count: int = 0
     corners: int = 0
     has_code = True
+    #: how many displacements the law reads, and whether it reads their rates
+    inputs: int = 1
+    moving = False
 
     def numbers(self, c: Array, sampling: Sampling) -> list[float]:
         """The numbers of the code, from the coefficients of the element and its smoothness there."""
@@ -70,6 +76,38 @@ class BatchForm(ABC):
     def corner(self, i: int, names: Names) -> tuple[list[str], str, str]:
         """Lines of code, then what changes sign at corner i, and its rate."""
         raise IndexError(i)
+
+    @functools.cached_property
+    def one_instant(self) -> OneInstant:
+        """The law at one instant, `(q.., r.., theta, numbers) -> (f, [f_q.., f_r..])`, of plain numbers: arrays of
+        length one take ten times as long. Raises what Python does where there is no real number.
+        """
+        q, r = ([f"{kind}{j}" for j in range(self.inputs)] for kind in "qr")
+        law = self.tangent(Names(q, r, lambda i: f"numbers[{i}]", "w"))
+        slopes = [text or "0.0" for text in (law.by_q + law.by_r if self.moving else law.by_q)]
+        head = f"def law({', '.join([*q, *(r if self.moving else ()), 'theta', 'numbers'])}):"
+        end = f"return float({law.force}), [{', '.join(f'float({text})' for text in slopes)}]"
+        return _function("\n    ".join([head, *law.lines, end]))
+
+
+@functools.lru_cache(maxsize=256)
+def _function(text: str) -> OneInstant:
+    """What a text of code is in Python."""
+    names = {"pi": math.pi, "absolute": math.fabs, "maximum": max, "sign": _sign, "arctan_log": _arctan_log}
+    functions = {"arcsin": "asin", "arccos": "acos", "arctan": "atan"}
+    plain = ("sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "log", "sqrt")
+    names |= {name: getattr(math, functions.get(name, name)) for name in (*functions, *plain)}
+    exec(text, names)
+    law: Any = names["law"]
+    return law
+
+
+def _sign(x: float) -> float:
+    return float((x > 0.0) - (x < 0.0))
+
+
+def _arctan_log(z: float) -> tuple[float, float]:
+    return math.atan(z), math.log1p(z * z)
 
 
 class PolynomialForm(BatchForm):
@@ -156,7 +194,7 @@ class WrittenForm(BatchForm):
 
     def __init__(self, law: Any) -> None:
         self.law = law
-        self.count = len(law.c)
+        self.count, self.inputs = len(law.c), law.count
         self.moving = law.depends_on_velocity
         self.places = law.corners()
         self.corners = len(self.places)

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from suboctave.errors import InputError
 from suboctave.model.elements.base import Array, BaseElement, Dof, Element, Place, numbers_of, required
-from suboctave.model.elements.batch_form import BatchForm, WrittenForm
+from suboctave.model.elements.batch_form import BatchForm
 from suboctave.model.elements.smoothness import Sampling, Surface
 from suboctave.model.elements.written import WrittenElement
 from suboctave.model.expressions.coefficients import Number
@@ -240,7 +240,7 @@ class Expression(CoupledElement):
         return f"Expression({self.place}, {self.expression!r:.60})"
 
     def batch_form(self, c: Array) -> BatchForm:
-        return WrittenForm(self._law)
+        return self._law.batch_form
 
     def sampling(self, c: Array) -> Sampling:
         """What the text shows: a polynomial, corners, steps in a velocity, or nothing."""

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from suboctave.errors import InputError, suggest
 from suboctave.model.elements.base import Array, Dof, Element, required
-from suboctave.model.elements.batch_form import BatchForm, WrittenForm
+from suboctave.model.elements.batch_form import BatchForm
 from suboctave.model.elements.smoothness import CornerSampling, SharpVelocitySampling
 from suboctave.model.expressions.coefficients import Number
 from suboctave.model.matrices import warn_of_negative
@@ -61,7 +61,7 @@ class WrittenElement(Element):
         return law_of(self.text, ("x",), True, type(self).__name__, self.coefficient_names)
 
     def batch_form(self, c: Array) -> BatchForm:
-        return WrittenForm(self.law)
+        return self.law.batch_form
 
     def tangent(self, u: Array, v: Array, c: Array) -> tuple[Array, Array, Array]:
         f, (f_u, f_v) = self.law.tangent(np.array([u, v]), np.zeros_like(u), c)

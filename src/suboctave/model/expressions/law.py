@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from suboctave.errors import InputError
 from suboctave.model.elements.base import Array
+from suboctave.model.elements.batch_form import WrittenForm
 from suboctave.model.elements.smoothness import (
     AdaptiveSampling,
     CornerSampling,
@@ -271,6 +272,11 @@ class Law:
         names = {state.name: states[i] for i, state in enumerate(self.q)}
         names |= {one.name: number(i) for i, one in enumerate(self.c)} | {_THETA: "theta", **more}
         return lines_of_code([_off_corners(part) for part in parts], names, f"{prefix}w")
+
+    @functools.cached_property
+    def batch_form(self) -> WrittenForm:
+        """See `BaseElement.batch_form`."""
+        return WrittenForm(self)
 
     def tangent(self, q: Array, theta: Array, c: Array) -> tuple[Array, Array]:
         """`(f, f_q)`, shapes (N,), (Q, N)."""
