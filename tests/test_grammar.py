@@ -235,7 +235,7 @@ TWO = {"method": so.TwoTrajectories(periods=3, steps_per_period=(100,))}
 #: options that others make idle: the call, and what is idle
 IDLE = {
     "seeds": (lambda: so.find_isolas(DUFFING, (1, 2), "F", (0.1, 0.2), search=(), seeds=so.Seeds()), "seeds"),
-    "seeds of a map": (lambda: so.regime_map(DUFFING, (1, 2), "F", (0.1, 0.2), seeds=so.Seeds()), "seeds"),
+    "seeds of a map": (lambda: so.regime_map(DUFFING, (1, 2), "F", (0.1, 0.2), search=(), seeds=so.Seeds()), "seeds"),
     "steps": (lambda: so.poincare_sections(DUFFING, 1.0, steps_per_period=50), "steps_per_period"),
     "two trajectories": (lambda: so.lyapunov_exponents(DUFFING, 1.0, periods=20, count=1, **TWO), "periods=, count"),
     "seed": (lambda: so.stepped_sine(DUFFING, (1.0, 1.1), seed=3), "seed"),

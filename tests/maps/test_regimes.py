@@ -9,6 +9,7 @@ import pytest
 
 import suboctave as so
 from suboctave.analysis.diagram import Followed, grown_from
+from suboctave.curves.identity import lies_on
 from suboctave.interruption import Interruption
 from suboctave.maps.catalogue import Catalogue, SearchRange, carrier_of
 from suboctave.maps.regimes.arcs import Arc, Edge, Slice, Strip
@@ -48,7 +49,7 @@ def test_a_raster_has_no_limit_of_arcs():
     arcs = [Arc(1 + i % 3, False, (Edge(1.0 + 0.01 * i), Edge(1.5 + 0.02 * i)), ()) for i in range(70)]
     catalogue = Catalogue(duffing(), "F", (0.0, 1.0), SearchRange(0.5, 3.5), "adaptive", {}, 1)
     strips = [Strip(0.0, 0.5, Slice(0.2, arcs=arcs), True), Strip(0.5, 1.0, None, False)]
-    regimes = RegimeMap(catalogue, strips, 2, 1e-4)
+    regimes = RegimeMap(catalogue, strips, 2, 1e-4, ())
     cells, labels = regimes.raster(90, 4)
     omega = 0.5 + (np.arange(90) + 0.5) / 90 * 3.0
     for row, value in enumerate((0.125, 0.375, 0.625, 0.875)):
@@ -117,6 +118,22 @@ def test_a_period_doubling_and_what_only_time_integration_knows(doubling, tmp_pa
     assert all(one.period in (3, 5) for one in checked.disagreements)
     doubling.plot(tmp_path / "map.png")
     assert (tmp_path / "map.png").stat().st_size > 10_000
+
+
+def test_an_isola_that_nothing_within_the_bounds_leads_to():
+    """It neither begins nor ends within the bounds, so that no curve of the response meets it: it is looked for."""
+    system = so.System(1.0, 0.05, 1.0, [so.ElasticStop(0, 6.0, "g")], [so.HarmonicLoad(0, 0.5)], parameters={"g": 0.4})
+    asked = (system, (2.2, 3.2), "g", (0.4, 0.5))
+    found = so.regime_map(*asked, depth=1, values=1)
+    assert found.searched == (2,)
+    assert "2T isolas were looked for." in repr(found)
+    assert max(regime.count for regime in found.regimes) == 2
+    inside = system.with_parameters({"g": 0.45})
+    known = so.find_subharmonics(inside, (2.2, 3.2), subharmonic=2, seeds=so.Seeds(8, 4, 3))
+    (orbit,) = (o for o in found.motions(2.4, 0.45) if o.basis.nu == 2)
+    assert any(lies_on(orbit, branch.points) for branch in known)
+    alone = so.regime_map(*asked, depth=1, values=1, search=())
+    assert (alone.searched, [str(regime) for regime in alone.regimes]) == ((), ["T"])
 
 
 def test_a_map_that_is_not_complete_says_so_in_its_picture(doubling):

@@ -411,11 +411,18 @@ def _turns_back(branch: Branch, item: Bifurcation) -> bool:
 MOST_VALUES = 10_000
 #: a search among resonances: coarse, since the branches themselves are followed afterwards
 _COARSE = Seeds(8, 4, 3)
+#: periods that are looked for so where nobody names any and nothing else leads to an isola
+UNASKED = (2,)
 
 
 def listed(values: Any) -> list[Any]:
     """The items of a sequence or an array; a single None for anything else."""
     return list(values) if isinstance(values, Sequence | np.ndarray) and not isinstance(values, str) else [None]
+
+
+def few(values: Sequence[float]) -> list[float]:
+    """The first, the middle and the last of ascending values."""
+    return sorted({values[0], values[len(values) // 2], values[-1]})
 
 
 def checked_orders(search: Any, least: int) -> tuple[int, ...]:

@@ -172,7 +172,7 @@ _ISOLAS = "isolas"
 #: attributes of a map, of the span of a region, and of a regime map that records hold as they are
 _OF_MAP = ("parameter", "second", "within", "bounds")
 _OF_SPAN = ("low", "high", "reasons", "closed", "settled")
-_OF_REGIMES = ("parameter", "bounds", "omega", "depth", "resolution")
+_OF_REGIMES = ("parameter", "bounds", "omega", "depth", "resolution", "searched")
 
 
 def _write_isola_map(made: IsolaMap) -> dict[str, xarray.Dataset]:
@@ -250,7 +250,7 @@ def _write_regimes(regimes: RegimeMap) -> dict[str, xarray.Dataset]:
 def _read_regimes(groups: Datasets, allow_code: bool, linear: LinearPart | None) -> RegimeMap:
     stored = _Opened("map", groups, allow_code, linear)
     record, branches, curves = stored.record, stored.parts, stored.named("curve_")
-    parameter, bounds, omega, depth, resolution = (record[name] for name in _OF_REGIMES)
+    parameter, bounds, omega, depth, resolution, searched = (record[name] for name in _OF_REGIMES)
     asked = stored.of, parameter, bounds, SearchRange(*omega), "adaptive", record["options"], len(curves)
     catalogue = Catalogue(*asked, notes=list(record["notes"]), interruption=record["interruption"])
     for curve in curves:
@@ -269,7 +269,7 @@ def _read_regimes(groups: Datasets, allow_code: bool, linear: LinearPart | None)
         met = [(branches[name], False) for name in dict.fromkeys(arc["branch"] for arc in given["arcs"]) if name]
         slices.append(Slice(given["value"], met, [arc(a) for a in given["arcs"]]))
     strips = [Strip(low, high, None if i is None else slices[i], seen) for low, high, i, seen in record["strips"]]
-    return stored.timed(RegimeMap(catalogue, strips, depth, resolution))
+    return stored.timed(RegimeMap(catalogue, strips, depth, resolution, searched))
 
 
 register(Codec("isolas", Isolas, _write_isolas, _read_isolas))

@@ -32,7 +32,7 @@ from suboctave.curves.junction import period_name
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.interruption import pass_on
-from suboctave.maps.catalogue import THROUGH, Catalogue, branch_through
+from suboctave.maps.catalogue import THROUGH, Catalogue, branch_through, few
 from suboctave.maps.isolas.result import Isola, IsolaEnd, Isolas
 from suboctave.maps.pieces import MonotonePiece
 from suboctave.results.branch import Branch
@@ -112,8 +112,7 @@ class Search:
     @property
     def few(self) -> list[float]:
         """The first, the middle and the last of the values."""
-        values = self.values
-        return sorted({values[0], values[len(values) // 2], values[-1]})
+        return few(self.values)
 
     def at(self, where: str, part: float = 0.0) -> None:
         """Report where the search is, and which part of the place that it looks at is done."""

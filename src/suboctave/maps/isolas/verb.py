@@ -29,7 +29,7 @@ from suboctave.curves.identity import lies_on
 from suboctave.curves.junction import period_name
 from suboctave.curves.starts import Harmonics
 from suboctave.errors import InputError, is_number, refuse_idle
-from suboctave.maps.catalogue import Catalogue, checked_orders, checked_values, listed
+from suboctave.maps.catalogue import UNASKED, Catalogue, checked_orders, checked_values, listed
 from suboctave.maps.isolas.responses import FROM_LOADS, Responses, UnderOtherLoads, followed_doublings
 from suboctave.maps.isolas.result import Isolas
 from suboctave.maps.isolas.search import Loop, Search, Stage
@@ -135,8 +135,8 @@ def checked_levels(levels: Any) -> tuple[float, ...] | None:
     return tuple(float(level) for level in given)
 
 
-#: levels of the loads, and periods of motions, that are tried where nothing else leads to an isola
-_LEVELS, _ORDERS = (1.5, 2.2, 3.2, 4.7), (2,)
+#: levels of the loads that are tried where nothing else leads to an isola
+_LEVELS = (1.5, 2.2, 3.2, 4.7)
 
 
 def _planned(
@@ -157,7 +157,7 @@ def _planned(
     search.stages.append(others)
     periods = {
         order: stage(f"a search for {period_name(order)} motions at {{}} values of {name}", orders is None)
-        for order in (_ORDERS if orders is None else orders)
+        for order in (UNASKED if orders is None else orders)
     }
     return responses, branches, others, periods
 

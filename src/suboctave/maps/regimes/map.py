@@ -68,6 +68,8 @@ class RegimeMap(PlaneMap):
         What vibrates, the design parameter, both ranges (ascending).
     depth
         How many period doublings deep branches were followed.
+    searched
+        Periods, in periods of the load, of which isolas were looked for among resonances.
     curves
         The curves of bifurcations that the labels rest on.
     strips
@@ -78,7 +80,9 @@ class RegimeMap(PlaneMap):
         What stopped the work, Ctrl-C or a time limit (`seconds`); None if it came to its end.
     """
 
-    def __init__(self, catalogue: Catalogue, strips: Sequence[Strip], depth: int, resolution: float) -> None:
+    def __init__(
+        self, catalogue: Catalogue, strips: Sequence[Strip], depth: int, resolution: float, searched: Sequence[int]
+    ) -> None:
         self.system = catalogue.system
         self.parameter = catalogue.name
         self.omega: tuple[float, float] = catalogue.omega
@@ -88,6 +92,7 @@ class RegimeMap(PlaneMap):
         self.strips = tuple(strips)
         self.depth = depth
         self.resolution = resolution
+        self.searched = tuple(searched)
         self.notes = catalogue.unsettled
         self.interruption = catalogue.interruption
 
@@ -293,8 +298,10 @@ class RegimeMap(PlaneMap):
         head = (
             f"Regimes for omega from {first:g} to {last:g}, {self.parameter} from {low:g} to {high:g}: "
             f"{len(self.regimes)} of stable motions up to {period_name(2**self.depth)}, from {len(self.curves)} curves "
-            f"of bifurcations and branches at {count} values of {self.parameter}."
+            f"of bifurcations and branches at {count} value{'s' * (count != 1)} of {self.parameter}."
         )
+        if looked := " and ".join(period_name(order) for order in self.searched):
+            head += f" {looked} isolas were looked for."
         shares = {regime: sum(r.share for r in self.regions if r.regime == regime) for regime in self.regimes}
         listed = sorted(shares.items(), key=lambda item: -item[1])
         lines = [f"  {100.0 * share:5.1f} %  {regime}" for regime, share in listed]

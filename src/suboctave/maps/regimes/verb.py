@@ -38,11 +38,13 @@ from suboctave.maps.catalogue import (
     FAILURES,
     MOST_VALUES,
     THROUGH,
+    UNASKED,
     AtValues,
     Catalogue,
     SearchRange,
     branch_through,
     checked_orders,
+    few,
 )
 from suboctave.maps.isolas.result import Isolas
 from suboctave.maps.pieces import MonotonePiece, Stretch, same_branch, stretches
@@ -82,7 +84,7 @@ def regime_map(
     values: int = 5,
     resolution: float = 1e-4,
     isolas: Isolas | None = None,
-    search: Sequence[int] = (),
+    search: Sequence[int] | None = None,
     seeds: Seeds | None = None,
     motions: Sequence[PeriodicOrbit] = (),
     max_curves: int = 64,
@@ -108,7 +110,8 @@ def regime_map(
         What `find_isolas` found over the same parameter: its curves need not be followed again.
     search, seeds
         Periods (3 for 3T, ...) of which isolas are looked for at the first `values` among the nonlinear resonances of
-        the linear modes (`find_subharmonics`), and how finely.
+        the linear modes (`find_subharmonics`), and how finely. Default: 2 where no closed branch was met otherwise and
+        2T motions are followed, at three of the values; () for never.
     motions
         Motions that are known from elsewhere, as from `RegimeCheck.unknown`: the branches that they lie on are mapped.
     max_curves, max_slices
@@ -131,8 +134,8 @@ def regime_map(
     if not is_number(resolution) or not 0.0 < resolution < 0.5:
         raise InputError(f"resolution must be a share of the range between 0 and 0.5, not {resolution!r}")
     followed = _checked_isolas(isolas, parameter)
-    orders, fine, given = checked_orders(search, 1), seeds, _checked_motions(motions, catalogue)
-    if not orders:
+    orders, given = checked_orders(search or (), 1), _checked_motions(motions, catalogue)
+    if search is not None and not orders:
         refuse_idle("no periods are looked for; name them in search=, or leave seeds out", seeds=seeds is not None)
     places = [catalogue.bounds[0] + (i + 0.5) / values * catalogue.span for i in range(values)]
     processes = check_workers(options.get("workers"))
@@ -142,15 +145,14 @@ def regime_map(
         for curve in followed:
             catalogue.add(curve)
         _follow_motions(given, catalogue)
-        looks = list(product(places, orders))
-        found = _Resonant(catalogue.emptied(), fine).over(looks, processes, catalogue)
-        for value, order in looks:
-            catalogue.progress(0.0, f"searching {period_name(order)} motions at {parameter} = {value:.6g}")
-            for branch in next(found):
-                _follow_curves_of(branch, value, catalogue)
-        plan.fill(places)
+        _search_resonances(orders, places, seeds, processes, catalogue)
+        plan.begin(places)
+        if search is None and depth and not plan.isolated:
+            orders = UNASKED
+            _search_resonances(orders, few(places), seeds, processes, catalogue)
+            plan.fill()
     with unlimited():
-        return RegimeMap(catalogue, plan.strips(), depth, resolution)
+        return RegimeMap(catalogue, plan.strips(), depth, resolution, orders)
 
 
 def _checked_isolas(isolas: Any, parameter: str) -> Sequence[TrackedBranch]:
@@ -225,6 +227,18 @@ class _Foreseen:
     reach: SearchRange
     diagrams: Sequence[BifurcationDiagram]
     notes: Sequence[Note]
+
+
+def _search_resonances(
+    orders: Sequence[int], values: Sequence[float], seeds: Seeds | None, workers: int, catalogue: Catalogue
+) -> None:
+    """Look for branches of some periods among resonances at values; the curves of their limit points lead to them."""
+    places = list(product(values, orders))
+    found = _Resonant(catalogue.emptied(), seeds).over(places, workers, catalogue)
+    for value, order in places:
+        catalogue.progress(0.0, f"searching {period_name(order)} motions at {catalogue.name} = {value:.6g}")
+        for branch in next(found):
+            _follow_curves_of(branch, value, catalogue)
 
 
 def _foresee(catalogue: Catalogue, longest: int, place: tuple[float, SearchRange]) -> _Foreseen:
@@ -441,12 +455,21 @@ class _Survey:
     workers: int = 1
     slices: list[_GrowingSlice] = field(default_factory=list)
 
-    def fill(self, values: Sequence[float]) -> None:
+    @property
+    def isolated(self) -> bool:
+        """Whether a closed branch that nothing leads to was met."""
+        return any(isolated for known in self.slices for _, isolated in known.branches)
+
+    def begin(self, values: Sequence[float]) -> None:
+        """Slices at first values, and at all that these ask for."""
+        for value in dict.fromkeys((values[0], values[-1])):
+            _follow_curves_beside(value, self.catalogue)
+        self.fill(values)
+
+    def fill(self, values: Sequence[float] = ()) -> None:
         """Add slices until every strip has one, and no limit point known is unexplained at any of them."""
         catalogue, waiting = self.catalogue, list(values)
-        for value in dict.fromkeys((values[0], values[-1])):
-            _follow_curves_beside(value, catalogue)
-        while waiting:
+        while True:
             foreseen = self._foreseen(waiting)
             for number, value in enumerate(waiting):
                 if len(self.slices) >= self.most:
@@ -468,6 +491,8 @@ class _Survey:
                     known.complete()
             empty = [0.5 * (a + b) for a, b, within in self._strips(self.resolution) if not within]
             waiting = empty or self._doubtful()
+            if not waiting:
+                return
 
     def _foreseen(self, values: Sequence[float]) -> Iterator[_Foreseen | None]:
         """What the response leads to at each value in the range that is known to be needed by now; None for one

@@ -148,14 +148,14 @@ class Regimes(DesignStep, kind="regime_map", verb=regime_map, besides=("check_po
     depth: int = Field(default=2, ge=0)
     values: int = Field(default=5, ge=1)
     resolution: float = Field(default=1e-4, gt=0.0, lt=0.5)
-    search: list[int] = Field(default_factory=list)
+    search: list[int] | None = None
     max_slices: int = Field(default=64, ge=1)
     check_points: int = Field(default=0, ge=0)
     seed: int = Field(default=0, ge=0)
 
     def check(self, around: CheckContext) -> Iterator[Complaint]:
         yield from super().check(around)
-        yield from tried("search", lambda: checked_orders(self.search, 1))
+        yield from tried("search", lambda: checked_orders(self.search or (), 1))
 
     def run(self, context: Context) -> Table:
         regimes: RegimeMap = self.computed(context)
