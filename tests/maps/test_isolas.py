@@ -354,7 +354,20 @@ def test_the_periods_that_were_searched_for_are_named():
     found = small_search(search=(3, 5), seeds=so.Seeds(2, 1, 1))
     assert list(found) == []
     assert found.summary.startswith("No isola of T, 3T and 5T motions was found for F from 0.2 to 1")
-    assert "a search for 3T motions at 2 values of F and a search for 5T motions at 2 values of F" in found.summary
+    assert "a search for 3T motions at 3 values of F and a search for 5T motions at 3 values of F" in found.summary
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("stiffness", "gap", "cubic"), [(15.3, 0.159, 0.2), (15.0, 0.17, 0.3)])
+def test_an_isola_that_exists_only_between_the_values(stiffness, gap, cubic):
+    """A search at one value inside its range knows it; at the values themselves there is none."""
+    elements = [so.ElasticStop(0, stiffness, gap), so.CubicSpring(0, cubic)]
+    system = so.System(1.0, 0.08, 1.0, elements, [so.HarmonicLoad(0, "q")], parameters={"q": 0.5})
+    asked = (1.45, 1.85)
+    here = {q: so.find_subharmonics(system.with_parameters({"q": q}), asked, subharmonic=3) for q in (0.1, 0.2, 0.4)}
+    assert [len(found) for found in here.values()] == [0, 1, 0]
+    isolas = so.find_isolas(system, asked, "q", (0.1, 0.4), values=2, levels=(), search=(3,))
+    assert any(isola.nu == 3 and 0.2 in isola for isola in isolas)
 
 
 def small_search(seconds=None, search=(), seeds=None):

@@ -21,6 +21,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -113,6 +114,11 @@ class Search:
     def few(self) -> list[float]:
         """The first, the middle and the last of the values."""
         return few(self.values)
+
+    @property
+    def closer(self) -> list[float]:
+        """The values, and those halfway between them."""
+        return sorted({*self.values, *(0.5 * (a + b) for a, b in pairwise(self.values))})
 
     def at(self, where: str, part: float = 0.0) -> None:
         """Report where the search is, and which part of the place that it looks at is done."""

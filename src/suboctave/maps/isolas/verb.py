@@ -79,9 +79,9 @@ def find_isolas(
         isolas join the main branch under stronger loads. Default: where no isola was found otherwise some between
         1.5 and 5, at three of the values, until one is found; () for never.
     search
-        Periods (2 for 2T, 3 for 3T, ...) of which isolas are looked for at these values among the nonlinear resonances
-        of the linear modes as well (`find_subharmonics`). Default: 2 where no isola was found otherwise, at three
-        of the values; () for never.
+        Periods (2 for 2T, 3 for 3T, ...) of which isolas are looked for at these values, and halfway between them,
+        among the nonlinear resonances of the linear modes as well (`find_subharmonics`). Default: 2 where no isola was
+        found otherwise, at three of the values; () for never.
     seeds
         How finely that is done.
     max_curves
@@ -100,7 +100,8 @@ def find_isolas(
     -----
     An isola is met if one of its limit points, followed over the parameter, leads to a branch that bifurcates from the
     response at one of `values`, or if the search meets it. One that does so nowhere within the bounds may be missed:
-    widen the bounds, or search for its period.
+    widen the bounds, or search for its period; one that exists only between the values at which it is searched asks for
+    more `values`.
     """
     catalogue = Catalogue.checked(system, parameter, bounds, omega, harmonics, max_curves, options)
     search_at = checked_values("values", values, catalogue.bounds, least=2)
@@ -117,7 +118,7 @@ def find_isolas(
         responses, branches, loads, periods = _planned(state, other_levels, orders)
         _from_responses(state, depth, processes, responses, branches)
         _from_load_levels(state, other_levels, depth, processes, loads)
-        _from_resonances(state, orders is not None, fine or Seeds(), periods)
+        _from_resonances(state, orders is not None, fine, periods)
     return state.result()
 
 
@@ -145,18 +146,20 @@ def _planned(
     """What the search looks at, in order: responses, branches that they leave open, other loads, periods."""
     name, count = search.catalogue.name, len(search.values)
 
-    def stage(words: str, fewer: bool, leads: bool = True) -> Stage:
-        search.stages.append(Stage(words, len(search.few) if fewer else count, leads=leads, spare=fewer))
+    def stage(words: str, planned: int, leads: bool = True, spare: bool = False) -> Stage:
+        search.stages.append(Stage(words, planned, leads=leads, spare=spare))
         return search.stages[-1]
 
-    responses = stage(f"the responses at {{}} values of {name}", False)
-    branches = stage(f"the other branches that their limit points lie on at {{}} values of {name}", False, False)
-    others = Stage(
-        "those at {} other levels of the loads", len(_LEVELS if levels is None else levels), spare=levels is None
+    responses = stage(f"the responses at {{}} values of {name}", count)
+    branches = stage(f"the other branches that their limit points lie on at {{}} values of {name}", count, leads=False)
+    count = len(_LEVELS if levels is None else levels)
+    others = stage("those at {} other levels of the loads", count, spare=levels is None)
+    words, count = (
+        "a search for {} motions at {{}} values of " + name,
+        len(search.few if orders is None else search.closer),
     )
-    search.stages.append(others)
     periods = {
-        order: stage(f"a search for {period_name(order)} motions at {{}} values of {name}", orders is None)
+        order: stage(words.format(period_name(order)), count, spare=orders is None)
         for order in (UNASKED if orders is None else orders)
     }
     return responses, branches, others, periods
@@ -203,17 +206,23 @@ def _from_load_levels(search: Search, levels: Sequence[float] | None, depth: int
         stage.done += 1
 
 
-def _from_resonances(search: Search, chosen: bool, seeds: Seeds, stages: Mapping[int, Stage]) -> None:
+#: how finely periods are looked for: as many frequencies as two values have by default, since what exists over a range
+#: of frequencies exists over one of the parameter
+_SEEDS = Seeds(20, 3, 3)
+
+
+def _from_resonances(search: Search, chosen: bool, seeds: Seeds | None, stages: Mapping[int, Stage]) -> None:
     """Motions of some periods near nonlinear resonances of the linear modes (`find_subharmonics`).
 
     Periods that nobody has `chosen` are looked for where no isola is known, at few values.
     """
-    for value in search.values if chosen else search.few:
+    fine = seeds or (_SEEDS if chosen else Seeds())
+    for value in search.closer if chosen else search.few:
         for order, stage in stages.items():
             if not chosen and search.isolas:
                 return
             known = [branch for branch in search.met.get(value, []) if branch.nu == order]
             search.at(f"{period_name(order)} motions at {search.catalogue.name} = {value:.6g}")
-            for branch in search.catalogue.resonant(value, order, seeds, known):
+            for branch in search.catalogue.resonant(value, order, fine, known):
                 search.meet(branch, value)
             stage.done += 1
