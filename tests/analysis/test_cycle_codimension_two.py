@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import suboctave as so
+from suboctave.curves import motion
+from suboctave.floquet.monodromy import floquet_multipliers
 from suboctave.timedomain import shoot_cycle
 
 pytestmark = pytest.mark.filterwarnings("ignore::suboctave.NegativeDampingWarning")
@@ -23,10 +25,34 @@ def cycles(*others, bounds=(-0.03, 0.01), **parameters):
 
 
 @pytest.fixture(scope="module")
-def torus():
-    """Its damping is that of the first one's square: NS where 0.8 <x^2> = m, at m = 0.4 A^2 if averaged."""
-    found = cycles("y'' + (0.8*x**2 + y**2 - m)*y' + s*y = 0", m=0.1, s=2.6)
-    return found.bifurcations["NS"][0]
+def damped_by_the_first():
+    """Its damping is that of the first one's square: NS where 0.8 <x^2> = m, at m = 0.4 A^2 if averaged. And how often
+    multipliers were computed along the curve.
+    """
+    computed = []
+
+    def counted(state):
+        computed.append(state)
+        return floquet_multipliers(state)
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(motion, "floquet_multipliers", counted)
+        found = cycles("y'' + (0.8*x**2 + y**2 - m)*y' + s*y = 0", m=0.1, s=2.6)
+    return found, len(computed)
+
+
+@pytest.fixture(scope="module")
+def torus(damped_by_the_first):
+    return damped_by_the_first[0].bifurcations["NS"][0]
+
+
+def test_what_rests_raises_no_doubt(damped_by_the_first):
+    """The second mass does not move but for rounding: what its law reads of that is the same in both halves of the
+    period as far as the law of the first one is.
+    """
+    curve, computed = damped_by_the_first
+    assert np.abs([orbit.x[:, 1] for orbit in curve.orbits]).max() < 1e-20
+    assert computed < 3 * len(curve)
 
 
 def multipliers(event):

@@ -53,6 +53,8 @@ _MONODROMY = Monodromy()
 Excursions = dict[int, float]
 #: height, in units of the largest relative displacement, up to which an excursion may end soon
 _YOUNG = 0.05
+#: odd Fourier coefficients of stiffness and damping, as a share of the largest, that are rounding
+_ROUNDING = 1e-8
 #: coefficient of a double multiplier, in units of omega, below which rounding has its say (an undamped structure)
 _NOTHING = 1e-9
 #: component of the unit tangent along the free parameter, in scaled arclength, up to which it may be rounding, and that
@@ -428,7 +430,9 @@ class Sample:
         harmonics are two sets then, conjugates of each other, and det J_half is the square of a modulus: pairs on the
         unit circle pass -1 (Swift & Wiesenfeld, Physical Review Letters 52, 1984).
         """
-        return all(channel.half_wave for channel in self.state.channels)
+        weights = self.state.balance.scales()[1]
+        odd, largest = np.max([channel.halves(weights) for channel in self.state.channels] or [(0.0, 0.0)], axis=0)
+        return bool(odd <= _ROUNDING * largest)
 
     @lazy
     def _half(self) -> Factor:

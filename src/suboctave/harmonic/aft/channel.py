@@ -25,8 +25,6 @@ from suboctave.lazy import lazy
 __all__ = ["Channel", "Group", "laws_along"]
 
 _NO_SPECTRUM = np.zeros(0, dtype=complex)
-#: odd Fourier coefficients of stiffness and damping, as a share of the largest, that are rounding
-_ROUNDING = 1e-8
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,11 +89,16 @@ class Channel:
         """Fourier coefficients of f_vi, empty for laws without velocity."""
         return self.spectra[1 + self.count + i] if self.moving else _NO_SPECTRUM
 
-    @lazy
-    def half_wave(self) -> bool:
-        """Whether stiffness and damping are the same in both halves of the period."""
-        derivatives = np.abs(self.spectra[1:])
-        return bool(derivatives[:, 1::2].max(initial=0.0) <= _ROUNDING * derivatives.max(initial=0.0))
+    def halves(self, weights: Array) -> tuple[float, float]:
+        """Largest Fourier coefficient of stiffness, or of damping times the frequency, that differs between the two
+        halves of the period, and largest of all, as squares of frequencies; weights: `HarmonicBalance.scales`.
+        """
+        reading = np.linalg.norm(self.ins * weights, axis=1)
+        factors = np.linalg.norm(self.out * weights) * reading
+        if self.moving:
+            factors = np.concatenate((factors, factors * self.along.rate))
+        derivatives = np.abs(self.spectra[1:]).T * factors
+        return float(derivatives[1::2].max(initial=0.0)), float(derivatives.max(initial=0.0))
 
     @lazy
     def second(self) -> list[Second]:
