@@ -148,6 +148,8 @@ def _in_modes(m: Array, c: Array, k: Array, l: Array, r: Array) -> tuple[Array, 
     size = np.abs(modes).T @ np.abs(c) @ np.abs(modes)
     scale = np.sqrt(np.abs(np.multiply.outer(damping.diagonal(), damping.diagonal())))
     damping = np.where(np.abs(damping) > np.maximum(1e-13 * scale, 4.0 * _EPS * size), damping, 0.0)
+    # what is free to move is not held by rounding: a unit of its displacement would be millions of the others'
+    values = np.where(np.abs(values) > len(m) * _EPS * np.abs(values).max(initial=0.0), values, 0.0)
     return np.diag(values), damping, l @ modes, r @ modes
 
 
