@@ -53,6 +53,8 @@ _MONODROMY = Monodromy()
 Excursions = dict[int, float]
 #: height, in units of the largest relative displacement, up to which an excursion may end soon
 _YOUNG = 0.05
+#: height of an extremum over its gap that is rounding along a curve of grazings, in units of the motion
+_GRAZING = 1e-8
 #: odd Fourier coefficients of stiffness and damping, as a share of the largest, that are rounding
 _ROUNDING = 1e-8
 #: coefficient of a double multiplier, in units of omega, below which rounding has its say (an undamped structure)
@@ -211,8 +213,16 @@ class Sample:
 
     @lazy
     def gaps(self) -> tuple[GapExtrema, ...]:
-        """The elements' gaps with the extrema of the motion there."""
-        return gap_extrema(self.state)
+        """The elements' gaps with the extrema of the motion there; what grazes all along a curve is at its gap itself:
+        on which side of that is rounding.
+        """
+        found, equations = gap_extrema(self.state), self.evaluation.equations.own
+        if not isinstance(equations, GrazingEquations):
+            return found
+        near = _GRAZING * equations.of.unit
+        return tuple(
+            replace(gap, value=np.where(np.abs(gap.value - gap.level) <= near, gap.level, gap.value)) for gap in found
+        )
 
     @lazy
     def young(self) -> list[Excursions]:
