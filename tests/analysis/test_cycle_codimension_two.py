@@ -137,7 +137,9 @@ def test_flip_neimark_sacker_points():
         assert np.abs(np.abs(mu[mu.imag > 0.1]) - 1.0) == pytest.approx([0.0], abs=1e-6)
 
 
-@pytest.mark.parametrize("square", [5.0, 5.7], ids=["apart", "close"])
+@pytest.mark.parametrize(
+    "square", [pytest.param(5.0, marks=pytest.mark.slow, id="apart"), pytest.param(5.7, id="close")]
+)
 def test_double_neimark_sacker_points(square):
     """y and z have the same damping, m = k, also where their multipliers lie close to each other on the circle."""
     second = f"y'' + (0.8*x**2 + y**2 - k)*y' + {square}*y = 0"

@@ -129,7 +129,7 @@ def test_a_time_limit_keeps_the_branches_that_are_there(strong, cascade, monkeyp
     so.bifurcation_diagram(strong, RANGE, depth=2, seconds=1e9, **COARSE)
     whole = next(looks)
     said = set()
-    for share in (0.2, 0.6, 0.95):
+    for share in (0.2, 0.95):
         looks = iter(range(10**9))
         diagram = so.bifurcation_diagram(strong, RANGE, depth=2, seconds=share * whole, **COARSE)
         assert diagram.interruption == interruption.Interruption(share * whole)

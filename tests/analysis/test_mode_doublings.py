@@ -117,7 +117,13 @@ def test_a_scaled_motion_is_the_same():
     assert not curve.bifurcations
 
 
-@pytest.mark.parametrize(("name", "bounds"), [("m", (0.98, 1.02)), ("k", (-0.02, 0.02)), ("a", (0.49, 0.51))])
+@pytest.mark.parametrize(
+    ("name", "bounds"),
+    [
+        ("a", (0.49, 0.51)),
+        *(pytest.param(*one, marks=pytest.mark.slow) for one in (("m", (0.98, 1.02)), ("k", (-0.02, 0.02)))),
+    ],
+)
 def test_a_condensed_structure(name, bounds):
     """Of the chain only the nonlinear mass is an unknown: the same curve as with all of them, and as anew."""
     curves = [so.track(of_the_chain(whole), name, bounds) for whole in (False, True)]

@@ -152,7 +152,7 @@ def test_limit_points_end_where_their_motions_become_symmetric():
         so.ElasticStop(0, 5.0, gap, side=side, regularization=50.0) for gap, side in (("g", "right"), ("-g", "left"))
     ]
     system = so.System(1.0, 0.08, 1.0, stops, [so.HarmonicLoad(0, "F")], {"g": 1.0, "F": 3.0})
-    curve = so.frequency_response(system, (0.3, 1.0))
+    curve = so.frequency_response(system, (0.3, 0.5), harmonics=31)
     branch = so.switch_branch(curve.bifurcations["BP"][0])
     limit_points = so.track(branch.bifurcations["LP"][0], "F", (0.3, 8.0), omega=(0.27, 5.5))
     assert limit_points.ended.count("the motions become symmetric") == 2

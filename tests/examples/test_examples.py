@@ -23,12 +23,15 @@ def test_there_are_examples():
 LONG = (
     "ex16_isola",
     "ex17_isolas_as_published",
+    "ex18_isola_merging",
     "ex21_damping_against_isolas",
     "ex22_regimes",
     "ex23_chaos",
     "ex24_basins",
+    "ex26_plate_with_stops",
     "ex27_how_far_from_an_isola",
     "ex31_isola_under_tolerances",
+    "ex32_equal_blades",
 )
 
 

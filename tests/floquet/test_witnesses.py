@@ -27,7 +27,7 @@ def exponents(system):
 
 
 # ------------------------------------------------------------------------------------------------------- shooting
-@pytest.mark.parametrize("each", [4, *slow(1)])
+@pytest.mark.parametrize("each", [8, *slow(1)])
 @each_method
 def test_fifty_motions_by_shooting(fifty, distances, method, each):
     """Within its own error estimate of shooting everywhere, the estimate below 1e-3, every verdict the same."""

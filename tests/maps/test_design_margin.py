@@ -10,7 +10,7 @@ import pytest
 import suboctave as so
 
 SYSTEM = so.library.reference_oscillator(p=0.55, j=0.5)
-RANGE = {"omega": (1.3, 4.5), "parameter": "j", "bounds": (0.0, 1.0), "harmonics": 15}
+RANGE = {"omega": (1.3, 4.5), "parameter": "j", "bounds": (0.0, 1.0), "harmonics": 15, "values": 2}
 
 
 @pytest.fixture(scope="module")

@@ -54,6 +54,15 @@ def test_birth_and_merging_by_searches_of_their_own(map_over, name, value):
     assert (low, high) == pytest.approx((float(isola.merges), float(isola.born)), abs=2e-5)
 
 
+def test_the_answer_does_not_depend_on_where_one_stands(isolas):
+    """From another value, the other way along both ranges."""
+    (found,) = so.find_isolas(
+        reference(j=0.3), (4.2, 1.9), "j", (1.0, 0.0), harmonics=HARMONICS, values=[0.1], levels=()
+    )
+    (isola,) = isolas
+    assert found.range == pytest.approx(isola.range, abs=1e-9)
+
+
 def test_what_the_map_contains(map_over):
     chosen = map_over("p")
     assert (chosen.parameter, chosen.second, chosen.notes) == ("j", "p", ())

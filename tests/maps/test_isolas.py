@@ -114,7 +114,8 @@ def test_stable_parts_by_shooting(isolas):
         assert so.verify(branch.orbits[index]).agrees
 
 
-@pytest.mark.parametrize("gap", [0.3, *(pytest.param(gap, marks=pytest.mark.slow) for gap in (0.5, 0.9))])
+@pytest.mark.slow
+@pytest.mark.parametrize("gap", [0.3, 0.5, 0.9])
 def test_the_answer_depends_neither_on_where_one_stands_nor_on_how_one_looks(isolas, gap):
     (isola,) = so.find_isolas(reference(j=gap), (4.2, 1.9), "j", (1.0, 0.0), values=[0.1])
     assert isola.range == pytest.approx(isolas[0].range, abs=1e-9)
@@ -153,22 +154,6 @@ def test_the_exact_law():
     assert isola.at(0.4).closed
 
 
-def test_a_system_without_any():
-    system = so.System(
-        mass=1.0,
-        damping=0.1,
-        stiffness=1.0,
-        elements=[so.CubicSpring(dof=0, coefficient=1.0)],
-        loads=[so.HarmonicLoad(dof=0, amplitude="F")],
-        parameters={"F": 0.3},
-    )
-    isolas = so.find_isolas(system, (0.8, 2.0), "F", (0.1, 0.4), harmonics=3, values=2, seeds=so.Seeds(2, 1, 1))
-    assert list(isolas) == []
-    assert "No isola of T" in repr(isolas)
-    assert isolas.limit_points
-    assert len(isolas.to_dataframe()) == 0
-
-
 @pytest.fixture(scope="module")
 def damped():
     """An oscillator whose damping falls and rises again with its velocity: over the load it has an isola.
@@ -201,7 +186,7 @@ def damped_ends():
     return [(w, load(w, a)) for w, a in roots]
 
 
-@pytest.mark.parametrize("bounds", [(0.005, 0.06), *slow((0.02, 0.06), (0.005, 0.03)), (0.02, 0.03)])
+@pytest.mark.parametrize("bounds", [*slow((0.005, 0.06), (0.02, 0.06), (0.005, 0.03)), (0.02, 0.03)])
 def test_an_isola_of_nonlinear_damping(damped, bounds):
     """Also where it meets no other branch within the bounds: stronger loads lead to it."""
     (isola,) = so.find_isolas(damped, (0.3, 2.0), "F", bounds, harmonics=1, values=2)
@@ -336,7 +321,7 @@ def test_a_closed_branch_that_was_interrupted_is_not_kept(isolas, monkeypatch):
     assert isola.at(value, seconds=1e-9) is whole  # what is known takes no time
 
 
-@pytest.mark.parametrize("share", [0.15, 0.4, 0.6, 0.7, 0.8, 0.97])
+@pytest.mark.parametrize("share", [0.15, 0.6, 0.97])
 def test_wherever_a_time_limit_falls_the_search_says_so(share, monkeypatch, looks_of_a_search):
     looks = iter(range(10**9))
     monkeypatch.setattr(interruption, "monotonic", lambda: float(next(looks)))
@@ -353,6 +338,8 @@ def test_the_periods_that_were_searched_for_are_named():
     """Also those of which nothing was found."""
     found = small_search(search=(3, 5), seeds=so.Seeds(2, 1, 1))
     assert list(found) == []
+    assert found.limit_points
+    assert len(found.to_dataframe()) == 0
     assert found.summary.startswith("No isola of T, 3T and 5T motions was found for F from 0.2 to 1")
     assert "a search for 3T motions at 3 values of F and a search for 5T motions at 3 values of F" in found.summary
 
