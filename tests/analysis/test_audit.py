@@ -107,7 +107,7 @@ def turning_pair(me):
 
 
 @pytest.mark.parametrize("me", [0.15, *slow(0.14, 0.16)])
-@pytest.mark.parametrize("omega", [(3.0, 0.3), (2.9, 1.2)])
+@pytest.mark.parametrize("omega", [(2.9, 1.2), pytest.param((3.0, 0.3), marks=pytest.mark.slow)])
 def test_a_pair_that_meets_at_minus_one(me, omega):
     found, finer = (
         so.frequency_response(turning_pair(me), omega, max_step=step).bifurcations["PD"] for step in (None, 0.03)
@@ -179,7 +179,7 @@ def shot(j):
     return sorted(locate_by_shooting(system, "PD", b.orbit.start(), b.omega).omega for b in pair)
 
 
-@each_step
+@pytest.mark.parametrize("max_step", [0.3, *slow(None)])
 @pytest.mark.parametrize("j", [0.177, *slow(0.17, 0.176)])
 def test_period_doublings_about_to_merge(j, max_step):
     system = rattling(j)
@@ -190,7 +190,7 @@ def test_period_doublings_about_to_merge(j, max_step):
         assert places(curve, "PD") == pytest.approx(shot(j), abs=1e-6)
 
 
-@each_step
+@pytest.mark.parametrize("max_step", [0.3, *slow(None)])
 def test_a_pair_that_only_more_harmonics_show(max_step):
     """At j = 0.177125 they are 6e-4 apart. With the five harmonics that suffice for the curve there are none."""
     system = rattling(0.177125)

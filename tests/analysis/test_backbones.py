@@ -49,7 +49,7 @@ def test_superharmonic_and_subharmonic_resonances(harmonic, order, omega, force)
     curve = so.phase_resonance(
         system,
         parameter="F",
-        bounds=(0.9 * force, 1.1 * force),
+        bounds=(0.97 * force, 1.03 * force),
         omega=omega,
         harmonic=harmonic,
         subharmonic=order,

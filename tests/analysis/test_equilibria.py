@@ -244,7 +244,16 @@ def pull_in_called():
     return so.System(1.0, 0.05, 1.0, [force], parameters={"V2": 0.1})
 
 
-@pytest.mark.parametrize("system", [pull_in(), pull_in(3.0), pull_in_called()], ids=["text", "stiffer", "function"])
+@pytest.mark.parametrize(
+    "system",
+    [
+        pytest.param(pull_in(), id="text"),
+        *(
+            pytest.param(one, id=name, marks=pytest.mark.slow)
+            for one, name in ((pull_in(3.0), "stiffer"), (pull_in_called(), "function"))
+        ),
+    ],
+)
 def test_a_pole_of_a_force_ends_the_curve(system):
     """Pull-in at x = 1/3, V2 = 8/27 k; the curve goes on towards the electrode, and no equilibrium lies behind it."""
     k = system.parameters.get("k", 1.0)

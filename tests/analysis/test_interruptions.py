@@ -322,7 +322,7 @@ def test_a_search_for_subharmonics_gives_the_branches_that_it_has(ticks):
     assert found.interruption == Interruption(0.7 * looks)
 
 
-@pytest.mark.parametrize(("order", "reach"), [(1, (0.7, 6.0)), (3, (4.0, 9.0))])
+@pytest.mark.parametrize(("order", "reach"), [(1, (0.7, 6.0)), pytest.param(3, (4.0, 9.0), marks=pytest.mark.slow)])
 def test_a_resonance_is_not_read_off_a_part_of_a_response(order, reach, ticks, monkeypatch):
     """Neither after a time limit nor after Ctrl-C: the peak may lie on what is missing."""
     system = so.System(

@@ -128,6 +128,7 @@ def test_what_is_in_doubt_at_one_place_is_one_stretch() -> None:
     assert (both[0].first, both[0].last) == (1.10, 1.12)
 
 
+@pytest.mark.slow
 def test_a_border_with_three_corners_closes(systems: ModuleType) -> None:
     """Behind one of them it comes back beside itself: a step that cuts it off must not head into it again."""
     description = systems.describe(510, strong=True)
@@ -173,6 +174,7 @@ def test_a_step_whose_interior_has_no_solution_is_halved(systems: ModuleType, hi
     assert not any("GPD near" in note for note in border.warnings)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("curve", [(734, "PD"), *slow((700, "LP"), (716, "LP"), (744, "LP"))], ids=str)
 def test_what_turns_in_a_corner_turns_there_once_whatever_the_steps(systems, curve):
     """Over the load, where another contact grazes: a curve neither comes back along itself nor turns to and fro."""

@@ -100,6 +100,7 @@ def test_a_response_that_is_highest_at_an_end_names_the_peak_inside_it():
     assert heights[place - 1] < heights[place] > heights[place + 1]
 
 
+@pytest.mark.slow
 def test_twenty_responses_of_a_nonlinear_absorber_have_their_peaks_on_the_ridge():
     system = so.library.nltva(F=0.05)
     response = so.frequency_response(system, (0.8, 1.4), harmonics=5)

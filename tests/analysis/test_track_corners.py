@@ -47,7 +47,7 @@ def limit_point() -> so.Bifurcation:
 
 
 @pytest.mark.parametrize("stepping", STEPS, ids=str)
-@pytest.mark.parametrize("which", [0, 1])
+@pytest.mark.parametrize("which", [pytest.param(0, marks=pytest.mark.slow), 1])
 def test_behind_a_corner_the_curve_goes_on_not_another_one_beside_it(which, stepping):
     # a second closed curve of period doublings comes within 1e-3 of the corner
     curve = closed(which, **stepping)

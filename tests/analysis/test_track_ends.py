@@ -198,6 +198,7 @@ def test_behind_a_corner_no_other_part_of_the_curve_is_taken():
     assert np.hypot(start[0] - end[0], start[1] - end[1]) > 1e-3
 
 
+@pytest.mark.slow
 def test_a_cubic_coefficient_that_jumps_in_a_corner_is_no_generalised_doubling():
     """c3 changes sign where a contact grazes, without vanishing: doublings are supercritical on both sides."""
 

@@ -38,7 +38,7 @@ def curves(system, scale, time):
     return {kind: so.track(b, "F", (0.3 * scale, 0.6 * scale)) for kind, b in sorted(kinds.items())}
 
 
-@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("turned", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_other_units(turned):
     length, mass, time = UNITS
     force = mass * length / time**2

@@ -47,7 +47,12 @@ def behind(b):
 
 
 @pytest.mark.parametrize(
-    ("Kc", "zeta", "share"), [(30.0, 0.05, 0.5), (30.0, 0.01, 0.5), (200.0, 0.01, 0.999), (1000.0, 0.05, 0.999)]
+    ("Kc", "zeta", "share"),
+    [
+        (30.0, 0.05, 0.5),
+        (1000.0, 0.05, 0.999),
+        *(pytest.param(*one, marks=pytest.mark.slow) for one in ((30.0, 0.01, 0.5), (200.0, 0.01, 0.999))),
+    ],
 )
 def test_folds_behind_a_grazing_by_shooting(Kc, zeta, share):
     curve, fold = first_fold(oscillator(Kc, zeta, share))

@@ -28,6 +28,7 @@ def test_a_rotor_that_meets_its_stator_jumps_where_the_orbit_reaches_the_clearan
     assert not any("could not be located" in note for note in curve.warnings)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("omega", [(5.0, 0.7), *slow((0.4, 6.0))])
 def test_a_rotor_that_whirls_into_its_stator_and_out_of_it(omega):
     """The whole curve: contact begins everywhere at once, the curve turns there at the upper of the two frequencies."""

@@ -57,6 +57,7 @@ def rotor(gravity, stiffness="k"):
     return so.System(*matrices, ring.elements, loads, parameters)
 
 
+@pytest.mark.slow
 def test_a_heavy_rotor_in_a_ring():
     """Contact begins at the bottom; doublings follow, and a torus, as multipliers in time say."""
     system = rotor(0.1)

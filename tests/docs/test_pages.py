@@ -7,13 +7,16 @@ from pathlib import Path
 
 import pytest
 from pages import DOCS, check_page
+from slow import slow
 
 ROOT = Path(__file__).parents[2]
+#: seconds each: maps and searches, which have tests of their own
+SLOW = ("api/maps.md", "howto/isola.md", "howto/period_doubling.md", "howto/regime_map.md", "tutorial/isola.md")
 SHORT = sorted(
     path.relative_to(DOCS).as_posix()
     for folder in ("tutorial", "howto", "api")
     for path in (DOCS / folder).glob("*.md")
-    if path.name != "first_study.md"
+    if path.name != "first_study.md" and path.relative_to(DOCS).as_posix() not in SLOW
 )
 #: what pages speak of that is made elsewhere
 BEFORE = {
@@ -78,7 +81,7 @@ def run(page, capsys, tmp_path, monkeypatch):
     check_page(page, capsys, BEFORE.get(page, ""), page in SILENT)
 
 
-@pytest.mark.parametrize("page", [*SHORT, "coming_from.md", "questions.md"])
+@pytest.mark.parametrize("page", [*SHORT, *slow(*SLOW), "coming_from.md", "questions.md"])
 def test_a_page_prints_what_it_says(page, capsys, tmp_path, monkeypatch):
     run(page, capsys, tmp_path, monkeypatch)
 
@@ -95,7 +98,7 @@ def test_every_page_with_code_is_run():
     }
     coded = {page for page in pages if re.search(r"^```python", (DOCS / page).read_text(encoding="utf-8"), re.M)}
     coded -= {page for page in coded if page.startswith("examples/")}  # generated of scripts that are tests themselves
-    assert coded <= {*SHORT, "coming_from.md", "questions.md", *LONG, *ELSEWHERE, *OUTLINE}
+    assert coded <= {*SHORT, *SLOW, "coming_from.md", "questions.md", *LONG, *ELSEWHERE, *OUTLINE}
     for page, test in ELSEWHERE.items():
         assert page.rpartition("/")[2] in (ROOT / "tests" / test).read_text(encoding="utf-8")
 

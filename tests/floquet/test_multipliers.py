@@ -206,7 +206,7 @@ SYSTEMS = {
 
 
 @pytest.mark.parametrize("name", SYSTEMS)
-@pytest.mark.parametrize("harmonics", [7, 21])
+@pytest.mark.parametrize("harmonics", [7, pytest.param(21, marks=pytest.mark.slow)])
 def test_against_shooting(name, harmonics):
     """The same motion by shooting: the stated errors cover the distance between the multipliers, and are not idle."""
     system, frequencies = SYSTEMS[name]

@@ -84,7 +84,7 @@ def test_a_power_cut_at_any_instant_leaves_whole_records(tmp_path):
     journal.close()
 
 
-@pytest.mark.parametrize("wait", [0.0, 0.003, 0.02, 0.1])
+@pytest.mark.parametrize("wait", [0.003, 0.1])
 def test_a_kill_at_any_instant_leaves_whole_records(tmp_path, wait):
     path = tmp_path / "a.journal"
     code = f"""

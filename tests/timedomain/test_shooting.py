@@ -163,7 +163,7 @@ def test_limit_points_of_a_softening_duffing_oscillator():
     assert locate_by_shooting(system, "LP", large, 0.84).omega == pytest.approx(0.836157, abs=6e-7)
 
 
-@pytest.mark.parametrize(("length", "time"), [(1e-6, 1e3), (1e3, 1e-3)])
+@pytest.mark.parametrize(("length", "time"), [(1e-6, 1e3)])
 @pytest.mark.parametrize("kind", ["PD", "LP"])
 def test_other_units_give_the_same_bifurcation(kind, length, time):
     state, omega = ((-0.246, 0.0142), 2.295) if kind == "PD" else ((-0.997, 0.129), 1.708)
