@@ -37,7 +37,7 @@ def paths(monkeypatch):
 def test_a_path_takes_over_where_newton_fails(paths):
     """Stiff stops, strong load: from the linear response Newton does not arrive at every frequency."""
     used = 0
-    for omega in (0.3, 0.6, 1.0, 1.3):
+    for omega in (0.6, 1.3):
         paths.clear()
         system = so.library.reference_oscillator(Kc=50.0, p=1.7)
         orbit = so.frequency_response(system, (omega, omega * 1.001), harmonics=63).orbits[0]

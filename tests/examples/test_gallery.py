@@ -44,6 +44,7 @@ def test_figure(script, tmp_path, monkeypatch):
     assert sorted(path.name for path in tmp_path.iterdir()) == names
 
 
+@pytest.mark.slow
 def test_without_a_path_the_figure_has_the_name_of_the_script(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     run(FOLDER / "fig08_phase_portraits.py", [], monkeypatch)

@@ -10,12 +10,12 @@ import pytest
 import suboctave as so
 
 SYSTEM = so.library.reference_oscillator(p=0.55, j=0.5)
-RANGE = {"omega": (1.3, 4.5), "parameter": "j", "bounds": (0.0, 1.0), "harmonics": 15, "values": 2}
+RANGE = {"omega": (1.3, 4.5), "parameter": "j", "bounds": (0.0, 1.0), "harmonics": 15}
 
 
 @pytest.fixture(scope="module")
 def isola() -> so.Isola:
-    (found,) = so.find_isolas(SYSTEM, **RANGE)
+    (found,) = so.find_isolas(SYSTEM, **RANGE, values=2, levels=(), search=())
     return found
 
 

@@ -18,11 +18,7 @@ DRAWN = {
     name: [float(v) for v in np.random.default_rng(seed).uniform(*ends, 5)]
     for seed, (name, ends) in enumerate(SECOND.items(), 2026)
 }
-CASES = [
-    pytest.param(name, value, marks=() if (name, i) == ("p", 0) else pytest.mark.slow, id=f"{name}={value:.3f}")
-    for name, values in DRAWN.items()
-    for i, value in enumerate(values)
-]
+CASES = [pytest.param(name, value, id=f"{name}={value:.3f}") for name, values in DRAWN.items() for value in values]
 
 
 def reference(**values):
@@ -45,6 +41,7 @@ def map_over(isolas):
     return made
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "value"), CASES)
 def test_birth_and_merging_by_searches_of_their_own(map_over, name, value):
     """Nothing of the map goes into such a search: it begins with responses at other values of the parameter."""

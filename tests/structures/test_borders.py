@@ -16,6 +16,7 @@ def plate(gap):
     return so.structures.clearance_plate(nx=20, ny=12, stops=1, Kc=1.0, gap=gap, p=0.2)
 
 
+@pytest.mark.slow
 def test_a_change_of_harmonics_leaves_nothing_in_doubt():
     response = so.frequency_response(plate(0.1), (2.8, 2.0))
     border = so.track(response.bifurcations["PD"][0], "gap", (0.09, 0.2))

@@ -41,6 +41,7 @@ def of_chain():
     return so.find_isolas(chain(), (1.9, 3.0), "j", (0.16, 0.3), harmonics=15, values=2, levels=(), search=())
 
 
+@pytest.mark.slow
 def test_two_isolas_of_a_chain(of_chain):
     """One unknown for ten masses; the numbers are those with ten (below)."""
     assert of_chain[0].known[min(of_chain[0].known)].orbits[0].balance.size == 1

@@ -42,6 +42,7 @@ def test_matrices_from_files(tmp_path, monkeypatch, capsys):
     assert isinstance(scope["frame"], so.Structure)
 
 
+@pytest.mark.slow
 def test_structural_damping(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     scope: dict = {}

@@ -72,6 +72,7 @@ def test_a_branch(stop, tmp_path):
     assert repr(again) == repr(check)
 
 
+@pytest.mark.slow
 def test_points_of_a_branch_whose_basis_grows_are_held_each_against_its_own():
     """Little damping leaves the multipliers of vibrations beyond a basis, which are others in each, near the circle."""
     mass, stiffness = chain_matrices(50)
