@@ -53,6 +53,11 @@ def test_what_rests_raises_no_doubt(damped_by_the_first):
     curve, computed = damped_by_the_first
     assert np.abs([orbit.x[:, 1] for orbit in curve.orbits]).max() < 1e-20
     assert computed < 3 * len(curve)
+    # nor does it make multipliers uncertain: where the cycles are stable, all others are within the circle
+    assert curve.multiplier_errors.max() < 1e-5
+    fold, torus = curve.bifurcations["LP"][0], curve.bifurcations["NS"][0]
+    beyond = curve.amplitude > max(fold.amplitude, torus.amplitude)
+    np.testing.assert_array_equal(curve.stable, beyond)
 
 
 def multipliers(event):

@@ -84,7 +84,7 @@ _LENGTHS = (1.2, 1.8, TURNS, 1.0 / 12.0)
 _FORGOTTEN = math.log(1e-14)
 #: how often panels are made shorter, as what is seen between their nodes needs it
 _DIVIDED = 6
-_TINY = float(np.finfo(float).tiny)
+_TINY, _EPS = float(np.finfo(float).tiny), float(np.finfo(float).eps)
 _NO_PASSAGES = np.zeros((2, 0))
 _NO_MULTIPLIERS = np.empty(0, dtype=complex), np.empty(0)
 
@@ -336,21 +336,25 @@ class Linearised:
     def _share(self, change: Array) -> float:
         """The share of a correction (C, 2, N) with which none moves the motion along a channel by more than `_LARGEST`
         of it, or its stiffness and damping by as much of theirs, whichever allows more: what is added to a channel at
-        rest may be many times its motion and mean nothing to its law. One that is not finite is left out.
+        rest may be many times its motion and mean nothing to its law, or its law nothing beside the others. One that
+        is not finite is left out.
         """
         if not np.isfinite(change).all():
             return 0.0
         after, kick = self._changed(change)
-        worst = 1.0
+        worst, rate = 1.0, self.state.rate
+        # rounding of the largest stiffness, or damping times the frequency
+        least = _EPS * max(float(np.abs(self.law[:, 1]).max()), rate * float(np.abs(self.law[:, 2]).max()), _TINY)
         for g in self.active.tolist():
             most, motion = (float(np.abs(part[g, 0]).max()) for part in (change, self.path))
             if most <= _LARGEST * motion:
                 continue
             own = self._own.together(g)
             turned = math.inf if kick[own].any() else 0.0
-            for old, new in ((self.law[own, part], after[own, part]) for part in (1, 2)):
+            for part, smallest in ((1, least), (2, least / rate)):
+                old, new = self.law[own, part], after[own, part]
                 if (new != old).any():
-                    turned = max(turned, float(np.abs(new - old).max() / max(np.abs(old).max(), _TINY)))
+                    turned = max(turned, float(np.abs(new - old).max() / max(np.abs(old).max(), smallest, _TINY)))
             worst = max(worst, min(most / max(motion, _TINY), turned) / _LARGEST)
         return 1.0 / worst
 
