@@ -32,9 +32,13 @@ def original(request):
     return request.param, so.frequency_response(oscillator(regularization=request.param), (4.5, 1.3))
 
 
+#: one unit at a time
+ALONE = [(1e-6, 1.0, 1.0), (1e3, 1.0, 1.0), (1.0, 1e-3, 1.0), (1.0, 1e3, 1.0), (1.0, 1.0, 1e-9)]
+
+
 @pytest.mark.parametrize(
     ("length", "time", "mass"),
-    [(1e-6, 1.0, 1.0), (1e3, 1.0, 1.0), (1.0, 1e-3, 1.0), (1.0, 1e3, 1.0), (1e-6, 1e-3, 1e5), (1.0, 1.0, 1e-9)],
+    [(1e-6, 1e-3, 1e5), *(pytest.param(*one, marks=pytest.mark.slow) for one in ALONE)],
 )
 def test_units(original, length, time, mass):
     regularization, first = original

@@ -133,7 +133,7 @@ def test_a_parameter_in_the_stiffness_rebuilds_the_basis():
 
 
 @pytest.mark.parametrize("what", ["stiffness", "mass", "damping"])
-@pytest.mark.parametrize("ratio", [1.04, 0.96])
+@pytest.mark.parametrize("ratio", [1.04, pytest.param(0.96, marks=pytest.mark.slow)])
 def test_along_a_curve_a_basis_grows_ahead(what, ratio):
     """A spring, a mass, a dashpot at one place: a few bases serve all values, between those they were made for too."""
     n, frequencies = 200, np.linspace(0.05, 0.7, 7)
@@ -158,7 +158,9 @@ def test_along_a_curve_a_basis_grows_ahead(what, ratio):
     assert sizes[1] < 1.5 * sizes[0]
 
 
-@pytest.mark.parametrize("what", ["frequency", "parameter", "both"])
+@pytest.mark.parametrize(
+    "what", ["both", *(pytest.param(one, marks=pytest.mark.slow) for one in ("frequency", "parameter"))]
+)
 def test_a_basis_does_not_depend_on_what_else_is_alive(what):
     """What a curve asks for first, and what others have asked for, leaves it as it is, bit for bit."""
     system = chain(80, [so.CubicSpring(79, 0.5)], [so.HarmonicLoad(79, 0.1)], k=0.5)

@@ -89,7 +89,7 @@ def test_points_of_a_branch_whose_basis_grows_are_held_each_against_its_own():
     "more",
     [
         [],
-        [so.CubicSpring(TIP, 0.3)],
+        pytest.param([so.CubicSpring(TIP, 0.3)], marks=pytest.mark.slow),
         [so.TanhFriction(TIP, 0.005, 0.02), so.CubicSpring((TIP, TIP - 5), 30.0)],
         [so.Expression(TIP, "0.1*x*y**2", inputs={"x": TIP, "y": 60})],
     ],
