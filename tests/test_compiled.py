@@ -104,6 +104,29 @@ def outer(x):
 """
 
 
+LITERALS = """
+from suboctave.compiled import kernel
+
+@kernel()
+def scaled(x, times):
+    return x * times
+
+@kernel()
+def outer(x):
+    return scaled(x, 2) + scaled(x, 3) + scaled(x, True)
+"""
+
+
+def test_a_kernel_called_with_literals_is_compiled_once_for_their_type(tmp_path, monkeypatch):
+    monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.setattr(compiled, "KERNELS", [])
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "suboctave_literals_of_a_test.py").write_text(LITERALS)
+    module = importlib.import_module("suboctave_literals_of_a_test")
+    assert module.outer(1.5) == 9.0
+    assert [str(types[1]) for types in module.scaled.signatures] == ["int64", "bool"]
+
+
 def test_a_kernel_is_compiled_anew_when_another_file_that_it_calls_has_changed(tmp_path, monkeypatch):
     monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path / "cache"))
     monkeypatch.setattr(compiled, "KERNELS", [])

@@ -33,6 +33,7 @@ from numba import config, njit
 from numba.core import event
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.compiler_lock import global_compiler_lock
+from numba.core.types.misc import unliteral
 
 from suboctave.progress import notebook_line
 from suboctave.session import in_notebook
@@ -293,6 +294,11 @@ def cached(**options: Any) -> Callable[[_Function], Any]:
                 return compile_for(*arguments, **named)
 
         result._compile_for_args = uninterrupted
+        template = result.get_call_template
+        # for every literal among its arguments a kernel would be compiled anew
+        result.get_call_template = lambda arguments, named: template(
+            tuple(map(unliteral, arguments)), {name: unliteral(kind) for name, kind in named.items()}
+        )
         return result
 
     return decorate

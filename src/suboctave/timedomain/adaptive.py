@@ -35,8 +35,7 @@ _DRIVER = """
 @cached(nogil=True, error_model="numpy")
 def adaptive(z, at, budget, start, samples, skip, tolerance, address, out, peaks, measure, growth):
     rows = z.reshape(-1, {lanes})
-    # not literals, for each of which `control` would be compiled anew
-    n, corners, count = np.int64({n}), np.int64({corners}), np.int64({count})
+    n, corners, count = {n}, {corners}, {count}
     if start:
         begin(z, address)
     for tried in range(budget):

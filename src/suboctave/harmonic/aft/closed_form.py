@@ -239,8 +239,8 @@ def add_laws(motions, laws, table):
         g = laws.owner[s]
         polynomial = laws.polynomial[laws.starts[0, s] : laws.starts[0, s + 1]]
         steps = laws.steps[laws.starts[1, s] : laws.starts[1, s + 1]]
-        at = laws.nodes[:, laws.starts[2, s] : laws.starts[2, s + 1]]
-        nr, ni, weights = at[0], at[1], at[2]
+        begin, end = laws.starts[2, s], laws.starts[2, s + 1]
+        nr, ni, weights = laws.nodes[0, begin:end], laws.nodes[1, begin:end], laws.nodes[2, begin:end]
         if steps.shape[0] > 0:
             places, widths = steps[:, 0].copy(), steps[:, 1].copy()
             nr, ni, weights = sharp_nodes(motions[g], places, widths, top + high, zr, zi, laws.rules[0], laws.rules[1])
