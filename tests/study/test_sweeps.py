@@ -198,6 +198,7 @@ def test_a_list_of_points_is_what_the_grid_holds_there_and_each_failure_stays_it
     assert "3 points over F, c, alpha, 2 with a failure" in repr(listed)
 
 
+@pytest.mark.slow
 @POSIX
 def test_a_worker_that_dies_costs_its_point_at_most(study, grid):
     def deadly(results):
