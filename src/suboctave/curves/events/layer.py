@@ -8,7 +8,8 @@ function g, like the square root of s:
 Where that term carries g through zero, the bifurcation is one of the non-smooth system: it owes its place to the
 contact that begins, and the critical multiplier crosses the circle in a sliver of the parameter. Newton's method for
 such a g, `s <- 2 sqrt(s s_0) - s` with s_0 the zero, converges from every start between the grazing and 4 s_0 and
-leaves the layer from any other: so it begins right behind the grazing (`behind_grazing`). The layer ends where the stop
+leaves the layer from any other. In r = sqrt(s) g is smooth: from g at the grazing and at one place behind it a secant
+tells s_0, or that there is none, and Newton's method begins there (`behind_grazing`). The layer ends where the stop
 turns the motion by itself: half the duration t of the contact is no longer small beside the stop's own time, `t
 sqrt(k/m) = 1`, k its stiffness and m the mass that it meets.
 
@@ -29,7 +30,7 @@ from dataclasses import replace
 import numpy as np
 
 from suboctave.bifurcation.bifurcation import CONTACT_KINDS, Bifurcation
-from suboctave.bifurcation.bordered import bordered
+from suboctave.bifurcation.bordered import bordered, weighted_operator
 from suboctave.bifurcation.gaps import GrazingContact, gap_extrema, height_at, stiffness_jump
 from suboctave.continuation.linear import Factor
 from suboctave.continuation.newton import correct
@@ -42,6 +43,7 @@ from suboctave.errors import ConvergenceError
 from suboctave.floquet.result import FloquetResult
 from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.evaluation import BalanceState
+from suboctave.harmonic.perturbation import Kind
 from suboctave.harmonic.truncation import motion_size
 
 #: exponent of the test function's path from the grazing below which it counts as a square root (1/2; smooth: 1)
@@ -54,8 +56,10 @@ _NEAR = 0.05
 _REACH = 0.01
 #: the same for one that is bracketed only
 _BRACKETED = 1e-3
-#: ways behind the grazing at which Newton's method starts, the last four for layers as thin as rounding
-_STARTS = (1e-10, 1e-8, 1e-6, 1e-4, 1e-11, 3e-11, 5e-11, 2e-10)
+#: way behind a grazing at which a test function is first looked at, and secants in its root
+_FIRST, _SECANTS = 1e-8, 3
+#: change of kappa that tells how det J_kappa depends on it, in units of the base frequency
+_TURN = 1e-6
 #: the multiplier that jumps across the unit circle
 _CRITICAL = {"LP": 1.0, "PD": -1.0}
 #: distance of the places of one grazing, relative
@@ -85,13 +89,15 @@ def grazing_beside(guess: Guess) -> GrazingContact | None:
 def behind_grazing(kind: BifurcationKind, guess: Guess) -> Singular | None:
     """A bifurcation in the layer behind a grazing near the guess, started from that grazing; None if there is none."""
     for touch, grazing, _ in _beside(guess, _REACH):
-        for start in _starts(touch, grazing, guess):
-            try:
-                solution = kind.solve(start)
-            except ConvergenceError:
-                continue
-            if kind.genuine(solution, start) and not _far(solution, replace(guess, state=grazing.state)):
-                return solution
+        start = _start(kind, touch, grazing, guess)
+        if start is None:
+            continue
+        try:
+            solution = kind.solve(start)
+        except ConvergenceError:
+            continue
+        if kind.genuine(solution, start) and not _far(solution, replace(guess, state=grazing.state)):
+            return solution
     return None
 
 
@@ -243,9 +249,44 @@ def _beside(guess: Guess, limit: float) -> list[tuple[Touch, Grazing, float]]:
     return sorted(near, key=lambda item: item[2])
 
 
-def _starts(touch: Touch, grazing: Grazing, guess: Guess) -> Iterator[Guess]:
-    """Points along the curve's tangent at a grazing, on the side on which the contact is young."""
-    state, here = grazing.state, replace(guess, state=grazing.state)
+def _start(kind: BifurcationKind, touch: Touch, grazing: Grazing, guess: Guess) -> Guess | None:
+    """Where a bifurcation lies in the layer behind a grazing, by secants of det J_kappa in the root of the way; None
+    where it lies on the other side, or beyond the reach of a layer.
+    """
+    here, way = replace(guess, state=grazing.state), _way_behind(touch, grazing, guess)
+    origin = here.vector(here.state)
+    if way is None:
+        return None
+
+    def ratio(root: float, kappa: float) -> complex:
+        """det J_kappa in units of that at the grazing: a young contact adds a term of rank one, in proportion to r."""
+        state = here.state if root == 0.0 else here.moved(origin + root**2 * way).state
+        sign, log = np.linalg.slogdet(weighted_operator(state, kind.operator, kappa)[0])
+        return complex(sign * np.exp(log - at_grazing[1]) / at_grazing[0])
+
+    at_grazing = np.linalg.slogdet(weighted_operator(here.state, kind.operator, guess.kappa)[0])
+    if at_grazing[0] == 0.0:
+        return None
+    root, kappa, own = math.sqrt(_FIRST), guess.kappa, guess.kappa
+    for _ in range(_SECANTS):
+        change = (ratio(root, own) - 1.0) / root
+        if kind.operator is Kind.FREE:
+            by_kappa = (ratio(0.0, own + _TURN * here.state.rate) - 1.0) / _TURN
+            slopes = np.array([[change.real, by_kappa.real], [change.imag, by_kappa.imag]])
+            root, turn = np.linalg.solve(slopes, [-1.0, 0.0]).tolist()
+            kappa = own + turn * here.state.rate
+        else:
+            root = -1.0 / change.real
+        if not 0.0 < root**2 <= _REACH:
+            return None
+    return replace(here.moved(origin + root**2 * way), kappa=kappa)
+
+
+def _way_behind(touch: Touch, grazing: Grazing, guess: Guess) -> Array | None:
+    """The curve's tangent at a grazing, (dimension + 1,), of unit length in scaled arclength, to the side on which the
+    contact is young; None where it has none.
+    """
+    state = grazing.state
     weights = _weights(state, guess)
     dimension = state.balance.dimension
     rows = state.balance.row_weights(dimension) / max(state.balanced.scale, np.finfo(float).tiny)
@@ -256,12 +297,11 @@ def _starts(touch: Touch, grazing: Grazing, guess: Guess) -> Iterator[Guess]:
     matrix[-1] = rise / np.linalg.norm(rise)
     factor = Factor.of(matrix, overwrite=True)
     if factor.singular:
-        return
+        return None
     # along it the extremum rises through the gap at a rate of one: an excursion is a maximum above, a minimum below
     tangent = factor.solve(np.eye(1, dimension + 1, dimension)[0])
     tangent *= (1.0 if touch.maximum else -1.0) / np.linalg.norm(tangent)
-    for way in _STARTS:
-        yield here.moved(guess.vector(state) + way * tangent / weights)
+    return np.asarray(tangent / weights)
 
 
 def _grazings_near(guess: Guess, young: bool) -> Iterator[tuple[Touch, Grazing, float]]:
