@@ -8,7 +8,9 @@ leads from a linear structure without resonances to the system,
 
 from share = 0 to 1 by continuation. At 0 there is one motion, so that a path that stays bounded cannot come back
 there: it reaches 1 through whatever folds lie on the way (Allgower & Georg, Numerical Continuation Methods, 1990,
-chapter 11). Damping and restoring forces bound it, linear stiffness or not, contacts closed at rest or not.
+chapter 11). Damping and restoring forces bound it, linear stiffness or not, contacts closed at rest or not. With few
+harmonics that path is short, but with few a motion that is made of impacts may not exist: then what rest leads to in
+time tells how many it has; at last the path, with as many as it needs.
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_left
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from functools import partial
@@ -39,9 +41,11 @@ from suboctave.harmonic.condensed import linear_part_of
 from suboctave.harmonic.evaluation import BalanceState, HarmonicBalance
 from suboctave.harmonic.linear_part import LinearPart
 from suboctave.harmonic.orbit import PeriodicOrbit
-from suboctave.harmonic.truncation import AdaptiveHarmonics
+from suboctave.harmonic.truncation import AdaptiveHarmonics, holding
 from suboctave.lazy import lazy
+from suboctave.model.projected import ProjectedSystem
 from suboctave.model.system import System
+from suboctave.projection import small_system
 from suboctave.timedomain import Trajectory, integrate
 
 #: harmonics that are expected of a rule that chooses them
@@ -121,6 +125,10 @@ _PATH = "path from a heavily damped linear structure"
 _STEPPING = SteppingOptions(max_step=0.1, initial_step=0.02, min_step=1e-9, max_points=1500)
 #: singular value of R_X, in units of omega^2 and of the masses, below which something moves freely
 _FREE = 1e-9
+#: periods in time in which a motion has settled as a rule, or so nearly that Newton's method arrives
+_PERIODS = 100
+#: samples of a period of the load that tell how many harmonics a motion has
+_SAMPLES = 1024
 #: growth of the motion along the path from which on it is called unbounded
 _UNBOUNDED = 1e4
 
@@ -195,12 +203,12 @@ def start_point(
         return _beside_given(curve, value, given, newton, reach)
     patient = replace(newton, iterations=max(newton.iterations, 40), damped=True)
     ways: list[tuple[str, Callable[[], tuple[MotionProblem, Array]]]] = []
-    for finer in _with_more_harmonics(curve):
-        kept, count = _like(finer, None, finer.reference), finer.balance.basis.harmonics
-        ways += [
-            (f"linear response with {count} harmonics", partial(lambda c: (c, linear_response(c, value)), finer)),
-            (f"{_PATH} with {count}", partial(_released, kept, value, newton)),
-        ]
+    kept, count = _like(curve, None, curve.reference), curve.balance.basis.harmonics
+    ways += [
+        (f"linear response with {count} harmonics", partial(lambda c: (c, linear_response(c, value)), curve)),
+        (f"{_PATH} with {count}", partial(_released, kept, value, newton)),
+        (f"motion after {_PERIODS} periods in time", partial(_after_periods, curve, value)),
+    ]
     if curve.adaptive is not None:
         ways.append((f"{_PATH} with as many as it needs", partial(_released, curve, value, newton)))
     loose: Floating | str | None = None
@@ -236,7 +244,7 @@ def _beside_given(
     curve: MotionProblem, value: float, given: Any, newton: NewtonOptions, reach: tuple[float, float] | None
 ) -> CurvePoint:
     """The curve's point beside a given motion, as `start_point`."""
-    guess, hint = _from_given(curve, value, given), ""
+    (curve, guess), hint = _from_given(curve, value, given), ""
     try:
         return settled(curve, guess, newton)
     except ConvergenceError as error:
@@ -284,17 +292,6 @@ def _loose(curve: MotionProblem, u: Array) -> Floating | str | None:
     return Floating(unheld(state, loose[0] * curve.balance.scales()[1]))
 
 
-def _with_more_harmonics(curve: MotionProblem) -> Iterator[MotionProblem]:
-    """The curve, and where the number of harmonics is free, with more of them: too few may have no motion at all."""
-    yield curve
-    if curve.adaptive is None:
-        return
-    nu = curve.balance.basis.nu
-    for harmonics in (15, 31, 63):
-        if curve.balance.basis.harmonics < harmonics * nu and harmonics <= curve.adaptive.usual:
-            yield curve.with_basis(HarmonicBasis(harmonics * nu, nu))
-
-
 def _like(curve: MotionProblem, adaptive: AdaptiveHarmonics | None, reference: float) -> MotionProblem:
     """The same motions with another rule for harmonics and another size of reference."""
     tolerance = 0.0 if adaptive is None else adaptive.tolerance
@@ -337,13 +334,14 @@ def settled(
     return make_point(solved, None, 0.0)
 
 
-def _from_given(curve: MotionProblem, value: float, given: Any) -> Array:
+def _from_given(curve: MotionProblem, value: float, given: Any) -> tuple[MotionProblem, Array]:
+    """The guess that is given, and the curve in a basis that holds it."""
     balance = curve.balance
     basis, n = balance.basis, balance.system.n
     if isinstance(given, PeriodicOrbit):
         if given.system.n != n:
             raise InputError(f"start has {given.system.n} DOFs, the system has {n}")
-        return curve.join(given.basis.resized(balance.linear.read(given.coefficients), basis), value)
+        return curve, curve.join(given.basis.resized(balance.linear.read(given.coefficients), basis), value)
     try:
         array = np.asarray(given, dtype=float)
     except (TypeError, ValueError, OverflowError):
@@ -354,30 +352,45 @@ def _from_given(curve: MotionProblem, value: float, given: Any) -> Array:
     if not np.isfinite(array).all():
         raise InputError("start contains numbers that are not finite")
     if array.ndim == 1 and array.size == 2 * n:
-        return _integrated(curve, value, array)
+        return _integrated(curve, value, balance.system.viscous_equivalent(), array)
     shape = np.shape(given)
     if array.ndim == 1 and n == 1:  # coefficients of one degree of freedom
         array = array[:, None]
     if array.ndim == 2 and array.shape[1] == n and array.shape[0] % 2 == 1 and array.shape[0] > 1:
-        return curve.join(
-            HarmonicBasis(array.shape[0] // 2, basis.nu).resized(balance.linear.read(array), basis), value
-        )
+        x = HarmonicBasis(array.shape[0] // 2, basis.nu).resized(balance.linear.read(array), basis)
+        return curve, curve.join(x, value)
     raise InputError(
         f"start must be a PeriodicOrbit, a state (x, dx/dt) of length {2 * n}, or coefficients of shape "
         f"(2 H + 1, {n}), H at least 1; got an array of shape {shape}"
     )
 
 
-def _integrated(curve: MotionProblem, value: float, state: Array) -> Array:
-    """Harmonics of the motion over one period from a state."""
+def _integrated(curve: MotionProblem, value: float, system: System, state: Array) -> tuple[MotionProblem, Array]:
+    """The motion over one period from a state of a system, as harmonics of the curve in a basis that holds it."""
     balance = curve.balance
     _, omega, values = curve.split(curve.join(np.zeros(balance.dimension), value))
-    samples = 8 * balance.basis.harmonics + 8
-    times = np.linspace(0.0, 2.0 * math.pi * balance.basis.nu / omega, samples + 1)
-    trajectory = integrate(balance.system.viscous_equivalent(), state, times, omega, values, rtol=1e-6)
+    nu = balance.basis.nu
+    samples = max(8 * balance.basis.harmonics + 8, 0 if curve.adaptive is None else _SAMPLES * nu)
+    times = np.linspace(0.0, 2.0 * math.pi * nu / omega, samples + 1)
+    trajectory = integrate(system, state, times, omega, values, rtol=1e-6)
     _check_no_rotation(balance.system, trajectory)
-    spectrum = np.fft.rfft(balance.linear.read(trajectory.x[:-1]), axis=0) / samples
-    return curve.join(spectrum_to_real(spectrum, balance.basis.harmonics), value)
+    moved = trajectory.x[:-1]
+    x = system.recovered(moved)[:] if isinstance(system, ProjectedSystem) else moved
+    spectrum = np.fft.rfft(balance.linear.read(x), axis=0) / samples
+    if curve.adaptive is not None:
+        curve = curve.with_basis(holding(balance, spectrum, curve.adaptive))
+    return curve, curve.join(spectrum_to_real(spectrum, curve.balance.basis.harmonics), value)
+
+
+def _after_periods(curve: MotionProblem, value: float) -> tuple[MotionProblem, Array]:
+    """The motion that rest leads to in time."""
+    balance = curve.balance
+    _, omega, values = curve.split(curve.join(np.zeros(balance.dimension), value))
+    own = balance.system.viscous_equivalent().with_parameters(values)
+    system = small_system(own, balance.highest_load * omega, [own.observed_dof])
+    end = 2.0 * math.pi * _PERIODS * balance.basis.nu / omega
+    settled_on = integrate(system, np.zeros(2 * system.n), np.array([0.0, end]), omega, rtol=1e-6)
+    return _integrated(curve, value, system, np.concatenate((settled_on.x[-1], settled_on.v[-1])))
 
 
 #: what a motion that turns may miss its beginning by after a period, relative to its velocities and to a turn

@@ -21,8 +21,8 @@ import numpy as np
 
 from suboctave.arguments import Count, Positive, checked
 from suboctave.errors import InputError
-from suboctave.harmonic.basis import Array, HarmonicBasis
-from suboctave.harmonic.evaluation import BalanceState, length
+from suboctave.harmonic.basis import Array, ComplexArray, HarmonicBasis
+from suboctave.harmonic.evaluation import BalanceState, HarmonicBalance, length
 
 #: most unknowns that adaptive selection goes to: beyond, the dense matrices cost more than the harmonics are worth
 _MOST_UNKNOWNS = 4000
@@ -127,6 +127,21 @@ def beyond_usual(state: BalanceState, options: AdaptiveHarmonics, one: bool = Fa
     few = state.balance.size * wanted.size <= (_FOR_ONE if one else _FEW_UNKNOWNS)
     lacking = basis.harmonics < wanted.harmonics and truncation(state) > options.tolerance
     return wanted if options.maximum is None and few and lacking else basis
+
+
+def holding(balance: HarmonicBalance, spectrum: ComplexArray, options: AdaptiveHarmonics) -> HarmonicBasis:
+    """The basis that holds a motion known in time by its harmonics (K + 1, size): those left out are smaller than the
+    tolerance, unless there may be no more.
+    """
+    nu = balance.basis.nu
+    twice = 2 * _USUAL + 1
+    few = options.maximum is None and balance.size * (2 * twice * nu + 1) <= _FEW_UNKNOWNS
+    most = twice if few else min(options.usual, (_MOST_UNKNOWNS / balance.size - 1) / (2 * nu))
+    sizes = np.linalg.norm(spectrum * balance.scales()[0], axis=1)
+    left_out = np.sqrt(np.cumsum(sizes[::-1] ** 2))[::-1]
+    rungs = _rungs(max(options.minimum, balance.highest_load), most, options.usual)
+    enough = (h for h in rungs if h * nu + 1 >= len(sizes) or left_out[h * nu + 1] <= options.tolerance * left_out[0])
+    return HarmonicBasis(next(enough, rungs[-1]) * nu, nu)
 
 
 def _expected(tail: Array, high: int, bound: float) -> float:
