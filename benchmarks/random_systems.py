@@ -372,7 +372,9 @@ def stated(omega: float, branch: so.Branch, width: float) -> bool:
 def verdicts(
     counts: list[int], pairs: list[tuple[int, int]], total: int, mine: list[so.Bifurcation], branch: so.Branch
 ) -> list[str]:
-    """Points whose number of unstable multipliers is not the judge's, between events that both know."""
+    """Points whose number of unstable multipliers is not the judge's, between events that both know, and beyond what
+    these are uncertain by.
+    """
     wrong: list[str] = []
     stretches = []
     if not pairs and total == 0 and not mine:
@@ -383,11 +385,13 @@ def verdicts(
             low = mine[j].arclength if j >= 0 else -np.inf
             high = mine[l].arclength if l < len(mine) else np.inf
             stretches.append((i + 1, low, high))
+    unsure = [(item.omega, item.uncertainty) for item in mine]
     for index, low, high in dict.fromkeys(stretches):
         if counts[index] < 0:
             continue
         for point in branch.points:
             near = min(abs(point.arclength - low), abs(point.arclength - high)) < 1e-4
+            near = near or any(abs(point.orbit.omega - omega) <= width for omega, width in unsure)
             said = not point.floquet.decided or point.floquet.clearance < 1e-4
             if low < point.arclength < high and not (near or said) and point.floquet.unstable != counts[index]:
                 wrong.append(

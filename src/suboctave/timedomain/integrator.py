@@ -219,6 +219,8 @@ class _Watch:
         return best[1], best[2]
 
 
+# what is not finite ends in an error that says where
+@np.errstate(over="ignore", invalid="ignore")
 def advance(
     model: Field,
     begin: float,

@@ -44,7 +44,7 @@ from suboctave.floquet.result import FloquetResult
 from suboctave.harmonic.basis import Array, HarmonicBasis
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.perturbation import Kind
-from suboctave.harmonic.truncation import motion_size
+from suboctave.harmonic.truncation import motion_size, truncation
 
 #: exponent of the test function's path from the grazing below which it counts as a square root (1/2; smooth: 1)
 _SQUARE_ROOT = 0.75
@@ -118,14 +118,14 @@ def unresolved(
     """What the neglected harmonics may do to the place of a bifurcation behind a grazing, in the free parameter.
 
     A short push moves the place where it acts by a sum over 1/k^2, whose rest falls like 1/H: the place with fewer
-    harmonics tells it. A bifurcation that is not found with two thirds of them is known up to the thickness of the
-    layer. `coarser`: a number of harmonics with which it was found before, and where.
+    harmonics tells it. Where there is none with two thirds of them that of the grazing does, beside the thickness of
+    the layer. `coarser`: a number of harmonics with which it was found before, and where.
     """
-    basis = guess.state.basis
+    basis, thickness = guess.state.basis, abs(guess.parameter - contact.parameter)
     if coarser is not None and 0.5 * basis.harmonics <= coarser[0] <= 0.75 * basis.harmonics:
-        fewer, value = coarser
+        fewer, moved = coarser[0], abs(coarser[1] - guess.parameter)
     elif basis.harmonics == 1:
-        return abs(guess.parameter - contact.parameter)
+        return thickness
     else:
         other = HarmonicBasis(2 * basis.harmonics // 3, basis.nu)
         fewer, state = other.harmonics, guess.state
@@ -138,9 +138,23 @@ def unresolved(
         if there is not None and _far(there, start):
             there = behind_grazing(kind, start)
         if there is None:
-            return abs(guess.parameter - contact.parameter)
-        value = guess.value(there.state)
-    return abs(value - guess.parameter) / (basis.harmonics / fewer - 1.0)
+            return max(thickness, _grazing_moved(start, contact) / (basis.harmonics / fewer - 1.0))
+        moved = abs(guess.value(there.state) - guess.parameter)
+    return moved / (basis.harmonics / fewer - 1.0)
+
+
+def _grazing_moved(start: Guess, contact: GrazingContact) -> float:
+    """How far from a contact's grazing that of the same contact lies beside a motion, in the free parameter; where
+    there is none as far as what the motion leaves out, in units of the parameter.
+    """
+    own = contact.element, contact.gap
+    places = [
+        start.value(grazing.state)
+        for touch, grazing, _ in _grazings_near(start, young=False)
+        if (touch.element, touch.contact(grazing, start.name).gap) == own
+    ]
+    moved = (abs(place - contact.parameter) for place in places)
+    return min(moved, default=truncation(start.state) * abs(start.parameter))
 
 
 def behind_their_grazings(located: list[tuple[float, Bifurcation]]) -> list[Bifurcation]:
