@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import suboctave as so
+from suboctave.bifurcation.bordered import NullVectors
 from suboctave.curves.events.layer import jumps
 from suboctave.timedomain import locate_by_shooting, shoot
 
@@ -87,6 +88,17 @@ def test_several_jumps_at_one_grazing_are_one_or_none():
     # beside another grazing it is another one
     elsewhere = replace(other, contact=replace(other.contact, gap=-0.8))
     assert jumps([item, elsewhere], curve.points) == ([item, elsewhere], [])
+    # of pairs the number outside tells the side; one that is solved for comes before one of which a bracket is known
+    solved = replace(item, kind="NS", uncertainty=1e-5, null_vectors=NullVectors(np.ones(1), np.ones(1)))
+    tori = [solved, replace(other, kind="NS", uncertainty=1e-6, null_vectors=None)]
+    pairs = [np.array([size * np.exp(1j), size * np.exp(-1j)]) for size in (0.9, 1.1)]
+    inside, outside = (
+        replace(stable[0], arclength=item.arclength + way, known=replace(stable[0].floquet, multipliers=pair))
+        for way, pair in zip((-1.0, 1.0), pairs, strict=True)
+    )
+    (one,), back = jumps(tori, [inside, outside])
+    assert (one.omega, one.uncertainty, back) == (item.omega, 1e-5, [])
+    assert jumps(tori, [inside, replace(inside, arclength=outside.arclength)]) == ([], [tori])
 
 
 @pytest.mark.slow

@@ -32,6 +32,7 @@ import numpy as np
 from suboctave.bifurcation.bifurcation import CONTACT_KINDS, Bifurcation
 from suboctave.bifurcation.bordered import bordered, weighted_operator
 from suboctave.bifurcation.gaps import GrazingContact, gap_extrema, height_at, stiffness_jump
+from suboctave.bifurcation.measures import upper
 from suboctave.continuation.linear import Factor
 from suboctave.continuation.newton import correct
 from suboctave.curves.events.grazings import Grazing, Touch
@@ -60,8 +61,8 @@ _BRACKETED = 1e-3
 _FIRST, _SECANTS = 1e-8, 3
 #: change of kappa that tells how det J_kappa depends on it, in units of the base frequency
 _TURN = 1e-6
-#: the multiplier that jumps across the unit circle
-_CRITICAL = {"LP": 1.0, "PD": -1.0}
+#: bifurcations that a grazing may bring about at which a multiplier, or a pair, jumps across the unit circle, and where
+_CRITICAL = {"LP": 1.0, "PD": -1.0, "NS": None}
 #: distance of the places of one grazing, relative
 _ONE = 1e-7
 
@@ -195,7 +196,8 @@ def jumps(items: list[Bifurcation], points: Sequence[BranchPoint]) -> tuple[list
         if len(sides) == 2 and sides[0] == sides[1]:
             back.append(run)
             continue
-        best = min(run, key=lambda item: item.uncertainty)
+        # one that is solved for before one of which a bracket is known
+        best = min(run, key=lambda item: (item.null_vectors is None, item.uncertainty))
         name = best.parameter_name
         reach = max(abs(item.parameter(name) - best.parameter(name)) for item in run)
         insort(kept, replace(best, uncertainty=max(best.uncertainty, reach)), key=lambda item: item.arclength)
@@ -254,7 +256,10 @@ def _one_jump(a: Bifurcation, b: Bifurcation) -> bool:
 
 def _side(kind: str, floquet: FloquetResult) -> bool:
     """On which side of a bifurcation of a kind a motion lies."""
-    return bool(np.prod(floquet.multipliers - _CRITICAL[kind]).real > 0.0)
+    critical = _CRITICAL[kind]
+    if critical is None:
+        return np.count_nonzero(np.abs(upper(floquet.multipliers)) > 1.0) % 2 == 0
+    return bool(np.prod(floquet.multipliers - critical).real > 0.0)
 
 
 def _beside(guess: Guess, limit: float) -> list[tuple[Touch, Grazing, float]]:
