@@ -79,6 +79,8 @@ def judged(seed: int, seconds: float) -> Row:
     system, ends = system_of(description), tuple(description["omega"])
     width = abs(ends[1] - ends[0])
     response = so.frequency_response(system, ends, seconds=2.0 * seconds)
+    if response.interrupted:
+        raise so.ConvergenceError(f"the response takes longer than {2.0 * seconds:g} s")
     doublings = [item for item in response.bifurcations["PD"] if item.orbit.basis.nu == 1]
     row = Row(len(doublings))
     for i, doubling in enumerate(doublings):
