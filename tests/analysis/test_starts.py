@@ -4,10 +4,27 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from slow import slow
 
 import suboctave as so
 from suboctave.curves import starts
 from suboctave.timedomain import integrate, shoot
+
+IMPACTS = (2000.0, (0.5, -0.6), 0.15, 0.7, 0.42)
+MORE_IMPACTS = [(4535.0, (0.66, -0.82), 0.096, 0.697, 0.376), (3000.0, (0.7,), 0.1, 0.7, 0.3)]
+
+
+@pytest.mark.parametrize("given", [IMPACTS, *slow(*MORE_IMPACTS)], ids=str)
+def test_what_is_made_of_impacts_begins_at_what_time_leads_to(given):
+    """Stops thousands of times as stiff as the spring, far below resonance: with few harmonics there is no motion."""
+    stiffness, gaps, damping, load, omega = given
+    stops = [so.ElasticStop(0, stiffness, gap) for gap in gaps]
+    system = so.System(1.5, damping, 0.58, stops, [so.HarmonicLoad(0, load)])
+    orbit = so.frequency_response(system, (omega, omega + 1e-4)).orbits[0]
+    assert orbit.basis.harmonics >= 63
+    exact = shoot(system, orbit.start(), omega)
+    assert exact.stable
+    assert orbit.amplitude() == pytest.approx(exact.amplitude, rel=1e-3)
 
 
 @pytest.mark.parametrize("omega", [0.3, 1.0, 1.3])

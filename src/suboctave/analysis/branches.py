@@ -80,7 +80,8 @@ def frequency_response(
     start
         Chooses among coexisting motions at the first frequency: a `PeriodicOrbit`, a point of a branch, a
         `Bifurcation`, a state `(x, dx/dt)` of shape (2 n,), or coefficients of shape (2 H + 1, n). Without it one is
-        looked for from the linear response: of several far from that, rounding may decide which.
+        looked for from the linear response, by a path from a heavily damped structure, and from what rest leads to in
+        time: of several motions far from the linear one, rounding may decide which.
     subharmonic
         Period of the motions in periods of the load, where it is not one (or that of `start`): the state or
         coefficients of `start` are then those of a motion of that period. Without `start` one is searched for over the

@@ -122,7 +122,7 @@ def own_linear_part(orbit: PeriodicOrbit, system: System | None = None) -> Linea
 
 _PATH = "path from a heavily damped linear structure"
 #: how the path is followed: contacts that begin or cease turn it within very short ways
-_STEPPING = SteppingOptions(max_step=0.1, initial_step=0.02, min_step=1e-9, max_points=1500)
+_STEPPING = SteppingOptions(max_step=0.1, initial_step=0.02, min_step=1e-9, max_points=800)
 #: singular value of R_X, in units of omega^2 and of the masses, below which something moves freely
 _FREE = 1e-9
 #: periods in time in which a motion has settled as a rule, or so nearly that Newton's method arrives
