@@ -175,7 +175,7 @@ GAPS = [(0.5, "right"), (-0.5, "left")]
 @pytest.mark.parametrize("max_step", [None, *slow(0.02, 0.15)])
 def test_pair_that_passes_the_circle_just_before_it_splits_beside_the_critical_multiplier(rattle, max_step):
     # the one real multiplier of it goes on to +1 (R1), within a stride of points whose multipliers are computed
-    curve = so.track(rattle, "k", (1.9, 3.8), omega=(0.3, 4.0), max_step=max_step)
+    curve = so.track(rattle, "k", (1.9, 6.0), omega=(0.3, 4.0), max_step=max_step)
     (item,) = (e for e in curve.bifurcations if e.kind == "LPNS")
     assert (item.omega, item.parameter("k")) == pytest.approx((0.8698852, 3.5015484), abs=1e-6)
     pair = item.multipliers[item.multipliers.imag > 0.0]
