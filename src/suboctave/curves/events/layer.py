@@ -199,8 +199,8 @@ def jumps(items: list[Bifurcation], points: Sequence[BranchPoint]) -> tuple[list
         # one that is solved for before one of which a bracket is known
         best = min(run, key=lambda item: (item.null_vectors is None, item.uncertainty))
         name = best.parameter_name
-        reach = max(abs(item.parameter(name) - best.parameter(name)) for item in run)
-        insort(kept, replace(best, uncertainty=max(best.uncertainty, reach)), key=lambda item: item.arclength)
+        reach = max(abs(item.parameter(name) - best.parameter(name)) + item.uncertainty for item in run)
+        insort(kept, replace(best, uncertainty=reach), key=lambda item: item.arclength)
     return kept, back
 
 
