@@ -154,10 +154,8 @@ def _planned(
     branches = stage(f"the other branches that their limit points lie on at {{}} values of {name}", count, leads=False)
     count = len(_LEVELS if levels is None else levels)
     others = stage("those at {} other levels of the loads", count, spare=levels is None)
-    words, count = (
-        "a search for {} motions at {{}} values of " + name,
-        len(search.few if orders is None else search.closer),
-    )
+    words = "a search for {} motions at {{}} values of " + name
+    count = len(search.few if orders is None else search.closer)
     periods = {
         order: stage(words.format(period_name(order)), count, spare=orders is None)
         for order in (UNASKED if orders is None else orders)
@@ -206,8 +204,7 @@ def _from_load_levels(search: Search, levels: Sequence[float] | None, depth: int
         stage.done += 1
 
 
-#: how finely periods are looked for: as many frequencies as two values have by default, since what exists over a range
-#: of frequencies exists over one of the parameter
+#: how finely periods are looked for: half as many frequencies as by default, at twice as many values
 _SEEDS = Seeds(20, 3, 3)
 
 
