@@ -14,9 +14,10 @@ import pytest
 
 import suboctave as so
 from suboctave.curves.augmentation import Augmentation, Equations
+from suboctave.curves.events import layer
 from suboctave.curves.events.layer import behind_grazing
 from suboctave.curves.events.locate import Guess, solve
-from suboctave.curves.events.monitors import LimitPoint
+from suboctave.curves.events.monitors import LimitPoint, NeimarkSacker
 from suboctave.errors import ConvergenceError
 from suboctave.timedomain import locate_by_shooting, shoot
 
@@ -152,6 +153,47 @@ def test_newton_starts_right_behind_the_grazing(Kc, zeta, share, rounding):
             assert found.state.omega == pytest.approx(fold.omega, abs=1e-12)
             assert abs(found.state.omega - fold.omega) < 0.01 * abs(behind(fold))
             assert found.residual < rounding
+
+
+@pytest.mark.parametrize("kind", [LimitPoint(), NeimarkSacker()], ids=lambda kind: kind.name)
+def test_a_contact_that_changes_nothing_brings_nothing_about(kind, monkeypatch):
+    _, fold = first_fold(oscillator(30.0, 0.05, 0.5), harmonics=9)
+    start = replace(guess_at(fold.orbit), kappa=0.3)
+    monkeypatch.setattr(layer, "weighted_operator", lambda *_: (np.eye(3, dtype=complex), np.ones(3)))
+    assert behind_grazing(kind, start) is None
+
+
+def test_a_determinant_that_grows_behind_the_grazing_has_no_zero_there(monkeypatch):
+    """A line in the root of the way that would vanish before the grazing: the bifurcation is none of its layer."""
+    curve, fold = first_fold(oscillator(30.0, 0.05, 0.5), harmonics=9)
+    grazing, original = curve.grazings[0].orbit.state(), layer.weighted_operator
+
+    def mirrored(state, kind, kappa):
+        here, there = (original(one, kind, kappa)[0] for one in (grazing, state))
+        return 2.0 * here - there, None
+
+    assert behind_grazing(LimitPoint(), guess_at(fold.orbit)) is not None
+    monkeypatch.setattr(layer, "weighted_operator", mirrored)
+    assert behind_grazing(LimitPoint(), guess_at(fold.orbit)) is None
+
+
+def test_where_fewer_harmonics_have_none_it_is_as_uncertain_as_its_grazing(monkeypatch):
+    """Another stop is struck before: the grazing of the second one moves with the harmonics of that."""
+    stops = [so.ElasticStop(0, 5.0, gap) for gap in (-0.3, 0.8)]
+    system = so.System(1.0, 0.1, 1.0, stops, [so.HarmonicLoad(0, 0.5)])
+    places = {}
+    for harmonics in (9, 6):
+        curve = so.frequency_response(system, (0.3, 1.2), harmonics=harmonics)
+        places[harmonics] = next(item for item in curve.grazings if item.contact.gap == 0.8)
+    moved = abs(places[6].omega - places[9].omega)
+    assert moved > 1e-5
+
+    def none(*_):
+        raise ConvergenceError("no solution")
+
+    monkeypatch.setattr(layer, "solve_or_behind", none)
+    stated = layer.unresolved(LimitPoint(), guess_at(places[9].orbit), places[9].contact)
+    assert stated == pytest.approx(moved / (9 / 6 - 1.0), rel=1e-6)
 
 
 def test_newton_does_not_take_any_standstill_for_convergence():

@@ -59,7 +59,7 @@ _REACH = 0.01
 _BRACKETED = 1e-3
 #: way behind a grazing at which a test function is first looked at, and secants in its root
 _FIRST, _SECANTS = 1e-8, 3
-#: change of kappa that tells how det J_kappa depends on it, in units of the base frequency
+#: change of kappa, in units of the base frequency, that tells how det J_kappa depends on it
 _TURN = 1e-6
 #: bifurcations that a grazing may bring about at which a multiplier, or a pair, jumps across the unit circle, and where
 _CRITICAL = {"LP": 1.0, "PD": -1.0, "NS": None}
@@ -276,29 +276,29 @@ def _start(kind: BifurcationKind, touch: Touch, grazing: Grazing, guess: Guess) 
     origin = here.vector(here.state)
     if way is None:
         return None
-
-    def ratio(root: float, kappa: float) -> complex:
-        """det J_kappa in units of that at the grazing: a young contact adds a term of rank one, in proportion to r."""
-        state = here.state if root == 0.0 else here.moved(origin + root**2 * way).state
-        sign, log = np.linalg.slogdet(weighted_operator(state, kind.operator, kappa)[0])
-        return complex(sign * np.exp(log - at_grazing[1]) / at_grazing[0])
-
-    at_grazing = np.linalg.slogdet(weighted_operator(here.state, kind.operator, guess.kappa)[0])
-    if at_grazing[0] == 0.0:
+    sign, log = np.linalg.slogdet(weighted_operator(here.state, kind.operator, guess.kappa)[0])
+    if sign == 0.0:
         return None
-    root, kappa, own = math.sqrt(_FIRST), guess.kappa, guess.kappa
+
+    def ratio(root: float, turn: float = 0.0) -> complex:
+        """det J_kappa in units of that at the grazing: a young contact adds a term of rank one, in proportion to r."""
+        there = here.moved(origin + root**2 * way).state
+        kappa = guess.kappa + turn * here.state.rate
+        its, larger = np.linalg.slogdet(weighted_operator(there, kind.operator, kappa)[0])
+        return complex(its / sign * np.exp(larger - log))
+
+    # a determinant that is real has no other unknown
+    by_turn = (ratio(0.0, _TURN) - 1.0) / _TURN if kind.operator is Kind.FREE else 1j
+    root, turn = math.sqrt(_FIRST), 0.0
     for _ in range(_SECANTS):
-        change = (ratio(root, own) - 1.0) / root
-        if kind.operator is Kind.FREE:
-            by_kappa = (ratio(0.0, own + _TURN * here.state.rate) - 1.0) / _TURN
-            slopes = np.array([[change.real, by_kappa.real], [change.imag, by_kappa.imag]])
-            root, turn = np.linalg.solve(slopes, [-1.0, 0.0]).tolist()
-            kappa = own + turn * here.state.rate
-        else:
-            root = -1.0 / change.real
-        if not 0.0 < root**2 <= _REACH:
+        by_root = (ratio(root) - 1.0) / root
+        both = by_root.real * by_turn.imag - by_root.imag * by_turn.real
+        if both == 0.0:  # the contact changes nothing
             return None
-    return replace(here.moved(origin + root**2 * way), kappa=kappa)
+        root, turn = -by_turn.imag / both, by_root.imag / both
+        if not 0.0 < root <= math.sqrt(_REACH):
+            return None
+    return replace(here.moved(origin + root**2 * way), kappa=guess.kappa + turn * here.state.rate)
 
 
 def _way_behind(touch: Touch, grazing: Grazing, guess: Guess) -> Array | None:
