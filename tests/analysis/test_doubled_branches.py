@@ -201,3 +201,17 @@ def test_a_limit_point_right_beside_the_birth_is_seen_from_both_ends(systems):
     (one,), (other,) = (branch.bifurcations["LP"] for branch in (there, back))
     assert one.omega == pytest.approx(other.omega, abs=2e-8)
     assert 0.0 < doublings[0].omega - one.omega < 1e-6
+
+
+@pytest.mark.slow
+def test_the_step_that_arrives_stays_on_its_branch(systems):
+    """Another branch arrives close by: a step onto it, behind its doubling, once ended this one there."""
+    description = systems.describe(1190, True)
+    system = systems.system_of(description)
+    doublings = so.frequency_response(system, tuple(description["omega"])).bifurcations["PD"]
+    start = min(doublings, key=lambda point: abs(point.omega - 0.937098))
+    branch = so.switch_branch(start)
+    assert branch.arrives is not None
+    assert branch.arrives.omega == pytest.approx(1.0230945, abs=1e-5)
+    assert not branch.warnings
+    assert {round(point.omega, 4) for point in branch.bifurcations["LP"]} == {0.9741, 0.9545, 1.0344, 1.0283, 1.0316}

@@ -191,9 +191,11 @@ class _Follower(Driver):
         """True if a step stays on its curve and its interior could be looked at, or ends where it meets another."""
         self._meeting = None
         if passes_doubling(b):
-            met = meeting(a, b, self.settings.newton)
-            self._meeting = None if met is None else (a, b, met)
-            return met is not None
+            met = self._met(a, b)
+            last = None if met is None else met.arrival.point
+            if met is None or met.finer is not None or last is None:
+                return met is not None
+            b = last
         a, b = self._plain(a), self._plain(b)
         assert isinstance(a.evaluation, MotionEvaluation)
         assert isinstance(b.curve, MotionProblem)
@@ -218,12 +220,18 @@ class _Follower(Driver):
         known = self._meeting
         if known is None or known[0] is not a or known[1] is not b:
             # a step too short to be halved
-            met = meeting(a, b, self.settings.newton)
-            if met is None:
-                return lost(a)
-            self._meeting = known = (a, b, met)
-        assert self.previous is not None
-        return None if known[2].finer is not None else known[2].behind(self.previous.point)
+            met = self._met(a, b)
+            return lost(a) if met is None else met.arrival
+        return None if known[2].finer is not None else known[2].arrival
+
+    def _met(self, a: CurvePoint, b: CurvePoint) -> Meeting | None:
+        """Where the branch meets its parent between two neighbours."""
+        met = meeting(a, b, self.settings.newton)
+        if met is not None:
+            assert self.previous is not None
+            met = replace(met, arrival=met.behind(self.previous.point))
+            self._meeting = (a, b, met)
+        return met
 
     def _floating(self, point: CurvePoint) -> str | None:
         """What floats on a motion, in words; None if all is held."""
