@@ -17,6 +17,7 @@ from suboctave.harmonic.perturbation import (
     bilinear_gradient,
     operator,
     operator_along,
+    operator_by_motion,
     parameter_gradient,
     rate_by_kappa,
 )
@@ -357,3 +358,6 @@ def test_operator_along_directions(case, kind):
     if kind is Kind.INTEGER:
         along = Direction(right.reshape(case.basis.size, 2))
         np.testing.assert_allclose(found[:, 1], second_derivative(state, directions[1], along), rtol=1e-9, atol=1e-9)
+        every = operator_by_motion(state, right)
+        alone = second_derivative(state, Direction(directions[0].x), along)
+        np.testing.assert_allclose(every @ directions[0].x.ravel(), alone, rtol=1e-9, atol=1e-9)

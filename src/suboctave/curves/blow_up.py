@@ -28,12 +28,14 @@ from suboctave.continuation.point import CurvePoint, make_point
 from suboctave.continuation.problem import Array, Curve, Evaluation
 from suboctave.curves.motion import MotionEvaluation, MotionProblem
 from suboctave.errors import ConvergenceError
+from suboctave.harmonic.derivatives import Direction
 from suboctave.harmonic.evaluation import BalanceState
+from suboctave.harmonic.perturbation import Kind, operator_along, operator_by_motion
 from suboctave.lazy import lazy
 
-#: odd part, as a share of the motion, below which what the equations change by with it is taken from a motion whose odd
-#: part is that large: closer to the doubling rounding would be divided by it
-_DIFFERENCE = 1e-6
+#: odd part, as a share of the motion, below which derivatives of the odd part's equations are those of their limit:
+#: closer to the doubling rounding would be divided by it
+_LIMIT = 1e-6
 #: odd part, as a share of the motion, that counts as none
 _NONE = 1e-7
 #: odd part, as a share of the motion, below which its own equations are solved less closely than the others: to the
@@ -114,18 +116,16 @@ class BlownUpEvaluation:
         top[:, n] = whole[:, :n] @ w
         # the even rows: w counts times eps
         top[np.ix_(~odd, odd)] *= eps
-        # the odd rows over eps, by a motion with an odd part of some size
-        least = _DIFFERENCE * self.size
-        if abs(eps) < least:
-            aside = curve.state(curve.joined(state.unknowns, w, least), state)
-            whole, over = aside.extended_jacobian(curve.motions.name), least
-            change, grows = whole[:, :n] @ w - aside.residual / over, eps / least
+        # the odd rows over eps; in the limit they are R_X w, even in eps
+        if abs(eps) < _LIMIT * self.size:
+            top[np.ix_(odd, ~odd)] = operator_by_motion(state, w)[np.ix_(odd, ~odd)]
+            top[odd, n] = 0.0
+            alone = Direction(np.zeros_like(state.x), {curve.motions.name: 1.0})
+            top[odd, n + 1] = operator_along(state, Kind.INTEGER, w, [alone])[odd, 0]
         else:
-            over, grows = eps, 1.0
-            change = top[:, n] - state.residual / over
-        top[np.ix_(odd, ~odd)] = whole[np.ix_(odd, ~odd)] / over
-        top[odd, n] = change[odd] * grows / over
-        top[odd, n + 1] = whole[odd, n] / over
+            top[np.ix_(odd, ~odd)] = whole[np.ix_(odd, ~odd)] / eps
+            top[odd, n] = (top[odd, n] - state.residual[odd] / eps) / eps
+            top[odd, n + 1] = whole[odd, n] / eps
         out[n, :n] = state.balance.column_weights**2 * w * curve.motions.force
         return out
 
@@ -231,10 +231,6 @@ class BlownUp:
     def joined(self, x: Array, w: Array, eps: float) -> Array:
         """Coefficients with the even part of x and an odd part of a size and direction."""
         return np.where(self.odd, eps * w, x)
-
-    def state(self, x: Array, like: BalanceState) -> BalanceState:
-        """The motion of coefficients (dimension,) at the frequency and the parameters of another."""
-        return like.balance.at(like.balance.shaped(x), like.omega, like.values)
 
     def motion(self, u: Array) -> Array:
         """(X, free parameter) of u."""

@@ -19,6 +19,7 @@ from suboctave.continuation.newton import NewtonOptions
 from suboctave.continuation.notes import Note
 from suboctave.continuation.point import point_ahead, point_between, solved_again
 from suboctave.continuation.problem import Curve
+from suboctave.curves.blow_up import BlownUp
 from suboctave.curves.corners import beyond_corner
 from suboctave.curves.driver import Driver
 from suboctave.curves.events.grazings import locate_grazings
@@ -81,7 +82,7 @@ class _Follower(Driver):
         headed = regular_point(start.turned if start.tangent[start.curve.parameter] * direction < 0.0 else start)
         self.march = March(headed, 0.0, *options)
         #: goes on from a point behind a corner
-        self._from = lambda point: March(regular_point(point), 0.0, *options, home=headed)
+        self._from = lambda point: March(point, 0.0, *options, home=headed)
         #: size of the last motion at which the parameter moved, or of the first, and how much larger motions may become
         self._size: tuple[float, float] | None = None
         #: where the corners that were passed lie
@@ -151,8 +152,12 @@ class _Follower(Driver):
         corner = beyond_corner(last, (p.orbit for p in reversed(self.trace.points)), self.settings.newton)
         if corner is None or corner[0] is None:
             return None
+        beyond = regular_point(corner[0])
+        if isinstance(self.march.start.curve, BlownUp) and not isinstance(beyond.curve, BlownUp):
+            # motions of half the period are none of the branch
+            return None
         self._guard.forget()
-        return corner[0]
+        return beyond
 
     def _interrupted(self) -> None:
         trace = self.trace
@@ -192,10 +197,9 @@ class _Follower(Driver):
         self._meeting = None
         if passes_doubling(b):
             met = self._met(a, b)
-            last = None if met is None else met.arrival.point
-            if met is None or met.finer is not None or last is None:
+            if met is None or met.arrival.point is None:
                 return met is not None
-            b = last
+            b = met.arrival.point
         a, b = self._plain(a), self._plain(b)
         assert isinstance(a.evaluation, MotionEvaluation)
         assert isinstance(b.curve, MotionProblem)
@@ -222,7 +226,7 @@ class _Follower(Driver):
             # a step too short to be halved
             met = self._met(a, b)
             return lost(a) if met is None else met.arrival
-        return None if known[2].finer is not None else known[2].arrival
+        return known[2].arrival
 
     def _met(self, a: CurvePoint, b: CurvePoint) -> Meeting | None:
         """Where the branch meets its parent between two neighbours."""
@@ -244,9 +248,6 @@ class _Follower(Driver):
 
     def _finer(self, a: CurvePoint, b: CurvePoint) -> Curve | None:
         """The curve with more harmonics, where those of a step leave it open whether a multiplier passes the circle."""
-        if self._meeting is not None:
-            finer = self._meeting[2].finer
-            return None if finer is None else finer.blown_up
         self._candidate = new = self._sample(self._plain(b))
         old, rule = self.previous, new.curve.adaptive
         # where sub-harmonic motions are born and end depends on their harmonics

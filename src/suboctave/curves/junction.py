@@ -186,8 +186,7 @@ class Meeting:
     """A branch that meets its parent: the parent's period doubling, its curve, how the march ends.
 
     `doubt`: the stretch between the last point and the parent if something may happen unseen there;
-    `multiplicity`: of the period doubling; `finer`: the branch with the harmonics that the doubling needs, where it has
-    fewer.
+    `multiplicity`: of the period doubling.
     """
 
     solution: Singular
@@ -195,7 +194,6 @@ class Meeting:
     arrival: Arrival
     doubt: Unsettled | None = None
     multiplicity: int = 1
-    finer: DoubledMotions | None = None
 
     def behind(self, before: CurvePoint) -> Arrival:
         """How the march ends, its last point behind another one."""
@@ -217,27 +215,30 @@ def meeting(a: CurvePoint, b: CurvePoint, newton: NewtonOptions) -> Meeting | No
     """The parent's period doubling in which the odd part vanishes between two neighbours in coordinates blown up; None
     if it is not solved for.
     """
-    curve = b.curve
-    assert isinstance(curve, BlownUp)
     try:
         landed = _landed(a, b, newton)
-        doubling, several = _doubling_at(landed, curve)
+        doubling, several = _doubling_at(landed)
+        while several == 1 and (finer := _finer(landed, doubling)) is not None:
+            landed = _landed_with(finer, landed, newton)
+            doubling, several = _doubling_at(landed)
     except ConvergenceError:
         return None
-    motions, state, basis = curve.motions, doubling.state, curve.motions.balance.basis
-    parent = motions.with_basis(basis.halved).with_balance(state.balance)
-    finer = None if several > 1 else _finer(curve, landed, doubling)
-    if finer is None:
-        before, smooth = _last_before(a, landed, doubling, newton)
-    else:
-        before, smooth = None, True
+    motions, state = _motions_of(landed), doubling.state
+    parent = motions.with_basis(motions.balance.basis.halved).with_balance(state.balance)
+    before, smooth = _last_before(a, landed, doubling, newton)
     there = motions.transfer(parent.u_of(state), parent)
     where = motions.where(there)
     last = float((a if before is None else before).u[-1])
     doubt = None if smooth else unseen(motions.name, last, float(there[-1]))
-    reason = f"reached the {period_name(basis.nu // 2)} motion at its period doubling at {where}"
+    reason = f"reached the {period_name(parent.balance.basis.nu)} motion at its period doubling at {where}"
     arrival = Arrival(before, Ending(EndReason.MET_BRANCH, where, reason))
-    return Meeting(doubling, parent, arrival, doubt, several, finer)
+    return Meeting(doubling, parent, arrival, doubt, several)
+
+
+def _motions_of(landed: CurvePoint) -> DoubledMotions:
+    """The curve as it stands on which a point in coordinates blown up lies."""
+    assert isinstance(landed.curve, BlownUp)
+    return landed.curve.motions
 
 
 def _landed(a: CurvePoint, b: CurvePoint, newton: NewtonOptions) -> CurvePoint:
@@ -256,8 +257,18 @@ def _landed(a: CurvePoint, b: CurvePoint, newton: NewtonOptions) -> CurvePoint:
     return make_point(solved, b.tangent, a.arclength)
 
 
-def _doubling_at(landed: CurvePoint, curve: BlownUp) -> tuple[Singular, int]:
+def _landed_with(motions: DoubledMotions, landed: CurvePoint, newton: NewtonOptions) -> CurvePoint:
+    """The same point of the branch with other harmonics; ConvergenceError where there is none."""
+    curve = motions.blown_up
+    guess, tangent = (curve.transfer(vector, landed.curve) for vector in (landed.u, landed.tangent))
+    solved = correct(curve, guess, curve.size_of_odd, curve.weights(guess, 0.0), newton)
+    return make_point(solved, tangent, landed.arclength)
+
+
+def _doubling_at(landed: CurvePoint) -> tuple[Singular, int]:
     """The parent's period doubling where the odd part vanishes, and how many fall together there."""
+    curve = landed.curve
+    assert isinstance(curve, BlownUp)
     motions = curve.motions
     x, omega, values = motions.split(curve.motion(landed.u))
     basis = motions.balance.basis
@@ -273,16 +284,17 @@ def _doubling_at(landed: CurvePoint, curve: BlownUp) -> tuple[Singular, int]:
     with suppress(ConvergenceError):
         found = locate_singular(guess, Kind.HALF)
         moved = motions.transfer(guess.vector(found.state), motions.with_balance(found.state.balance))
-        if length(curve.motions.weights(moved, 0.0) * (moved - curve.motion(landed.u))) <= _BESIDE:
+        if length(motions.weights(moved, 0.0) * (moved - curve.motion(landed.u))) <= _BESIDE:
             return found, 1
     # with one harmonic more than the branch has the parent's doubling may lie elsewhere
     vectors = null_vectors(state, Kind.HALF)
     return Singular(state, vectors, 0.0, landed.evaluation.error, landed.iterations), 1
 
 
-def _finer(curve: BlownUp, landed: CurvePoint, doubling: Singular) -> DoubledMotions | None:
+def _finer(landed: CurvePoint, doubling: Singular) -> DoubledMotions | None:
     """The branch with as many harmonics as its parent's doubling is listed with; None where it has them."""
-    motions, rule = curve.motions, curve.motions.adaptive
+    motions = _motions_of(landed)
+    rule = motions.adaptive
     if rule is None:
         return None
     assert isinstance(landed.evaluation, BlownUpEvaluation)
@@ -309,7 +321,8 @@ def _last_before(
     # over twice the period
     multipliers = doubling.floquet.multipliers**2
     leads = doubling_curvature(doubling, curve.motions.name)
-    close = beside_doubling(curve, landed.u, landed.weights, multipliers, newton, leads, 0.7 * float(a.u[-2]))
+    most = 0.7 * float(a.u[-2])
+    close = beside_doubling(curve, landed.u, landed.weights, multipliers, newton, leads, most)
     return (None, False) if close is None else (close.point.turned, close.smooth)
 
 

@@ -31,7 +31,7 @@ from suboctave.harmonic.assembly import apply_blocks, toeplitz
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.derivatives import Direction, change_at, second_derivative
 from suboctave.harmonic.evaluation import BalanceState
-from suboctave.harmonic.trigonometric import motion, pulled, wave_sums
+from suboctave.harmonic.trigonometric import motion, pulled, spectra, wave_sums
 from suboctave.harmonic.waves import Frequencies, Kind, Waves, as_waves, fourier
 
 __all__ = ["Gradient", "Kind", "bilinear_gradient", "operator", "operator_along", "parameter_gradient"]
@@ -309,6 +309,29 @@ def operator_along(
                 column += rate * _per_wave(block, form.v)
         columns.append(Waves(column, at).vector(kind))
     return np.stack(columns, axis=1)
+
+
+def operator_by_motion(state: BalanceState, right: Array) -> Array:
+    """Derivative of `R_X right` by the coefficients, `right` kept fixed, (dimension, dimension).
+
+    `R''[right, a] = B T(g) a` with `g_r = sum_s f_rs q_s` for the change q along `right` of what a law reads: an
+    operator like R_X itself, g in place of the law's tangent.
+    """
+    basis, high, n = state.basis, state.basis.harmonics, state.balance.size
+    along = Direction(state.balance.shaped(right))
+    turning = state.omega * basis.derivative(np.eye(basis.size))
+    out = np.zeros((basis.size, n, basis.size, n))
+    for channel in state.channels:
+        bent = np.zeros((channel.along.size, 2 * high + 1), dtype=complex)
+        for zr, zi, weights in channel.second:
+            values = np.einsum("rsn,sn->rn", weights, change_at(channel, along, zr, zi))
+            bent += spectra(values, np.ones_like(zr), zr, zi, 2 * high)
+        for i, d in enumerate(channel.ins):
+            matrix = toeplitz(bent[i], high)
+            if channel.moving:
+                matrix = matrix + toeplitz(bent[channel.count + i], high) @ turning
+            out += np.einsum("kl,r,s->krls", matrix, channel.out, d)
+    return out.reshape(state.x.size, state.x.size)
 
 
 def _channel_along(form: _Form, channel: Channel, a: Direction, turn: np.ndarray) -> ComplexArray:
