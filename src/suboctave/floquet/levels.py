@@ -15,6 +15,7 @@ costs.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
@@ -92,8 +93,8 @@ class Along(NamedTuple):
 
 
 class Choice(NamedTuple):
-    """A level, how far what it leaves out moves multipliers, and the exponents of its own blocks within a period, (B,);
-    see `left_out.moved_without`.
+    """A level, how far what it leaves out moves multipliers, and the exponents of the blocks of its own states within a
+    period, (own,); see `left_out.moved_without`.
     """
 
     level: Level
@@ -106,9 +107,12 @@ class Levels:
 
     def __init__(self, blocks: Blocks) -> None:
         self.blocks = blocks
-        self.whole = Choice(_level(blocks, blocks.coupled), 0.0, np.zeros(blocks.coupled))
+        whole = _level(blocks, blocks.coupled)
+        self.whole = Choice(whole, 0.0, np.zeros(whole.own))
         self._cuts = np.arange(0, blocks.coupled, max(1, blocks.coupled // _CUTS))
         self._first, self._rates = blocks.first[self._cuts], blocks.rates[self._cuts]
+        #: of the cuts the first one that leaves no fewer states worth it
+        self._end = int(self._first.searchsorted((1.0 - _FEWER) * whole.states))
         self._made: dict[tuple[int, int], Level | None] = {}
 
     def of(self, slow: int, order: int) -> Level | None:
@@ -129,20 +133,22 @@ class Levels:
         few = _substitute(blocks, slow, order)
         return None if few is None else _level(blocks, slow, few)
 
-    def fewest(self, along: Along, resolved: float, tolerable: float) -> Choice:
+    def fewest(self, along: Callable[[], Along], resolved: float, tolerable: float) -> Choice:
         """The level with about the fewest states of those by which multipliers move no farther than is tolerable; all
         blocks with rates up to `resolved` have states.
         """
-        least, count = self.whole, 2 * len(self.blocks.active)
-        resolving = int(np.searchsorted(self._rates, resolved, side="right"))
+        least, resolving = self.whole, int(self._rates.searchsorted(resolved, side="right"))
+        if resolving >= self._end:
+            return least
+        motion, count = along(), 2 * len(self.blocks.active)
         for order in _ORDERS:
             # the more slow blocks there are, the less is left out
             most = (1.0 - _FEWER) * least.level.states - count * order
-            low, high = resolving, int(np.searchsorted(self._first, most))
+            low, high = resolving, int(self._first.searchsorted(most))
             while low < high:
                 # beside one that serves another seldom does with fewer states
                 middle = (low + high) // 2 if order == _ORDERS[0] else high - 1
-                choice = self._tried(along, int(self._cuts[middle]), order, tolerable)
+                choice = self._tried(motion, int(self._cuts[middle]), order, tolerable)
                 if choice is None:
                     low = middle + 1
                 else:
@@ -156,7 +162,9 @@ class Levels:
             return None
         shifts = np.empty(slow)
         moved = moved_without(*along, level.left_out, tolerable, shifts)
-        return Choice(level, moved, shifts) if moved <= tolerable else None
+        if moved > tolerable:
+            return None
+        return Choice(level, moved, np.repeat(shifts, np.diff(level.first[: slow + 1])))
 
 
 @lru_cache(maxsize=16)

@@ -143,10 +143,10 @@ class Linearised:
         self._beyond = (state.basis.harmonics + 0.5) * state.rate
         events = events_along(self._motions, laws.pieces, laws.owner, passages, grid.zr, grid.zi)
         events = own.marked(events, laws.owner)
-        self.events = events[np.argsort(events[:, 0], kind="stable")]
+        self.events = events[events[:, 0].argsort(kind="stable")]
         panels, start = panels_between(self.events, longest)
         self._evaluated(panels)
-        self._choice = self._levels.fewest(self._along(), self._beyond, self._tolerable)
+        self._choice = self._levels.fewest(self._along, self._beyond, self._tolerable)
         self._level = self._choice.level
         self._contacts()
         for _ in range(_DIVIDED):
@@ -187,9 +187,8 @@ class Linearised:
         if rest > 0.0:
             self._kept = np.flatnonzero(np.repeat(level.decays * rest >= _FORGOTTEN, np.diff(level.first)))
         self.size = size = len(self._kept)
-        self.own = int(np.searchsorted(self._kept, level.own))
-        shifts = np.repeat(self._choice.shifts, np.diff(level.first[: level.slow + 1]))
-        self.missing = (np.sqrt(_ASSURED * shifts) * level.sizes)[:, self._kept[: self.own]]
+        self.own = int(self._kept.searchsorted(level.own))
+        self.missing = (np.sqrt(_ASSURED * self._choice.shifts) * level.sizes)[:, self._kept[: self.own]]
         self._forms, self._turned = forms_along(self._level, self._sequence)
         self._structures = structure(self.spans, self._stretch, self._forms)
         self._acting = np.empty((len(self.spans), channels), dtype=bool)
@@ -230,7 +229,7 @@ class Linearised:
         form of the structure has.
         """
         held, self._stretch = stretches(self.base, self.active)
-        self._sequence, self.loose = tuple(map(tuple, held.tolist())), np.zeros_like(self.base)
+        self._sequence, self.loose = tuple(map(tuple, held.tolist())), np.zeros(self.base.shape)
         for r, stiffness in enumerate(self._sequence):
             if form_of(self._level, stiffness) is None:
                 self.loose[:, self._stretch == r] = self.base[:, self._stretch == r]
@@ -268,10 +267,15 @@ class Linearised:
         own = own_values(imaginary, left, right, self.own)
         return np.concatenate((mu[own], mu[~own]))
 
-    @property
+    @lazy
     def standing(self) -> ComplexArray:
         """Multipliers along the motion as it stands, (own,)."""
         return self._all_standing[: self.own]
+
+    @lazy
+    def finite(self) -> bool:
+        """Whether the monodromy matrix is made of numbers."""
+        return bool(np.isfinite(self.before).all())
 
     @property
     def rounding(self) -> float:
@@ -307,7 +311,7 @@ class Linearised:
         weight: share of its part along the direction of the real multiplier nearest to +1.
         """
         share, start = 1.0, self._start
-        change = np.zeros_like(self.path)
+        change = np.zeros(self.path.shape)
         if len(self.active):
             if not self.state.driven:
                 start = self._still()
@@ -319,7 +323,7 @@ class Linearised:
             )  # fmt: skip
             if excess > 1.0:
                 share = self._share(change)
-                change = share * change if share > 0.0 else np.zeros_like(change)
+                change = share * change if share > 0.0 else np.zeros(change.shape)
         law, kick = self._changed(change)
         after = self._march(law, kick, self.size)[self._kept]
         mu, shift = np.empty(self.size, dtype=complex), np.empty((2, self.size))
@@ -330,7 +334,7 @@ class Linearised:
         )  # fmt: skip
         mu, shift = mu[: self.own], shift[:, : self.own]
         # where multipliers meet on their way the first order tells too little: each has at least come from the nearest
-        np.maximum(shift[0], np.abs(mu[:, None] - self.standing).min(axis=1), out=shift[0])
+        np.maximum(shift[0], np.minimum.reduce(np.abs(mu[:, None] - self.standing), axis=1), out=shift[0])
         return mu, shift, share
 
     def _share(self, change: Array) -> float:
@@ -360,9 +364,11 @@ class Linearised:
 
     def _doubt(self, change: Array, share: float) -> float:
         """Share of a correction that is wrong by what the level leaves out, of forces beyond the harmonics."""
-        size = float(np.abs(change[:, 0]).max(initial=0.0))
         missing = self._level.left_out
-        alone = share * self._unbalanced * (0.0 if missing is None else beyond(missing, self._beyond))
+        if missing is None:
+            return 0.0
+        size = float(np.abs(change[:, 0]).max(initial=0.0))
+        alone = share * self._unbalanced * beyond(missing, self._beyond)
         return min(1.0, alone / size) if size > 0.0 else 0.0
 
 
@@ -405,19 +411,20 @@ def floquet_multipliers(state: BalanceState) -> FloquetResult:
 def _result(motion: Linearised, with_states: Callable[[Linearised], tuple[ComplexArray, Array]]) -> FloquetResult:
     """Of the linear part's equation of motion; `with_states` gives multipliers and errors of the blocks with states."""
     mu, errors = motion.others()
-    if not np.isfinite(motion.before).all():
+    if not motion.finite:
         return _no_numbers(motion.state, motion.size + len(mu))
     if motion.own:
         own, own_errors = with_states(motion)
         mu, errors = np.concatenate((own, mu)), np.concatenate((own_errors, errors))
-    order = np.argsort(-np.abs(mu), kind="stable")
+    order = (-np.abs(mu)).argsort(kind="stable")
     return FloquetResult(mu[order], errors[order])
 
 
 def _as_it_stands(motion: Linearised) -> tuple[ComplexArray, Array]:
     """Multipliers of the blocks that have states along the motion as it stands, with the errors of computing them."""
-    mu = motion.standing
-    return mu, np.full(len(mu), _least(motion) * max(1.0, float(np.abs(mu).max())))
+    mu, errors = motion.standing, np.empty(motion.own)
+    errors.fill(_least(motion) * max(1.0, float(np.maximum.reduce(np.abs(mu)))))
+    return mu, errors
 
 
 def _least(motion: Linearised) -> float:
