@@ -50,15 +50,22 @@ def length(vector: Array) -> float:
     return math.sqrt(flat.dot(flat))
 
 
-def distance(u: Array, v: Array, weights: Array) -> float:
+@kernel()
+def distance(u, v, weights):
     """`|weights (u - v)|`."""
-    return length(weights * (u - v))
+    way = np.empty(len(u))
+    for i in range(len(u)):
+        way[i] = weights[i] * (u[i] - v[i])
+    return math.sqrt(np.dot(way, way))
 
 
-def cosine(a: Array, b: Array, weights: Array) -> float:
+@kernel()
+def cosine(a, b, weights):
     """Cosine of the angle between two vectors in scaled variables."""
-    a, b = weights * a, weights * b
-    return float(a.dot(b)) / math.sqrt(a.dot(a) * b.dot(b))
+    one, other = np.empty(len(a)), np.empty(len(a))
+    for i in range(len(a)):
+        one[i], other[i] = weights[i] * a[i], weights[i] * b[i]
+    return np.dot(one, other) / math.sqrt(np.dot(one, one) * np.dot(other, other))
 
 
 @kernel()

@@ -126,15 +126,19 @@ class Place:
                 return distance(own.u, other.u, weights) < _SAME
         return False
 
-    def _beside(self, point: CurvePoint, new: CurvePoint, sense: float) -> Iterator[tuple[int, Array, float]]:
+    def _beside(self, point: CurvePoint, new: CurvePoint, sense: float) -> list[tuple[int, Array, float]]:
         """Its images that the step from `point` to `new` passes, headed as it is (+1) or the other way round (-1):
         which they are, where they lie, and the fraction of the step at which it passes them.
         """
         w, own = new.weights, self.point
         step = distance(new.u, point.u, w)
         here, reach = new.parameter, 1.5 * step / w[new.curve.parameter]
-        if all(abs(here - value) > reach for value in self._values):
-            return
+        for value in self._values:
+            if abs(here - value) <= reach:
+                break
+        else:
+            return []
+        passed = []
         if self._images is None or self._images[0] is not new.curve:
             self._images = (new.curve, new.curve.images(new.curve.transfer(own.u, own.curve)))
         for i, turned in enumerate(self._images[1]):
@@ -149,7 +153,8 @@ class Place:
             same_way = sense * float((w * leaving) @ (w * new.tangent)) > 0.5 * length(w * leaving)
             # a curve that is closed begins anew beyond its start; one that has come back may end on it
             if same_way and before >= 0.0 and beyond > (0.0 if sense > 0.0 else -_BESIDE * step):
-                yield i, image, length(from_point) / (length(from_point) + length(to_new))
+                passed.append((i, image, length(from_point) / (length(from_point) + length(to_new))))
+        return passed
 
 
 @dataclass(frozen=True)
@@ -257,7 +262,8 @@ class March:
             if marked and count > marked + 3 and mark.passed(point, new) is not None:
                 self.ending = Ending(EndReason.ASTRAY, new.curve.where(new.u))
                 return
-            if count > 3 and any(place.retraced(point, new, self.newton) for place in {home, mark}):
+            back_again = count > 3 and home.retraced(point, new, self.newton)
+            if back_again or (marked and mark.retraced(point, new, self.newton)):
                 self.ending = Ending(EndReason.RETRACED, new.curve.where(new.u))
                 return
             landed: CurvePoint | None = None

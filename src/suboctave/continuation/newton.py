@@ -100,7 +100,7 @@ def closely(options: NewtonOptions) -> NewtonOptions:
 
 def factorised(evaluation: Evaluation, row: Array | None, weights: Array) -> Factor:
     """Factorise `[F_u; row]`, or F_u alone, with columns scaled to arclength."""
-    scaled = np.empty((len(weights), len(weights)))
+    scaled = np.empty((weights.size, weights.size))
     np.multiply(evaluation.jacobian, 1.0 / weights, out=scaled if row is None else scaled[:-1])
     if row is not None:
         scaled[-1] = row
@@ -191,7 +191,7 @@ def correct(
 
 def _beneath(vector: Array, number: float) -> Array:
     """A vector with a number below it."""
-    out = np.empty(len(vector) + 1)
+    out = np.empty(vector.size + 1)
     out[:-1], out[-1] = vector, number
     return out
 

@@ -98,8 +98,8 @@ def apply_blocks(blocks, x):
 
 
 @kernel()
-def balance_residual(x, blocks, force, load, directions, weight, parts, sizes):
-    """A X, F and `R = A X + F - P` into `parts` (3, 2 H + 1, n), and |R|, |A X|, |F|, |P| into `sizes` (4,).
+def balance_residual(x, blocks, force, load, directions, weight, parts):
+    """A X, F and `R = A X + F - P` into `parts` (3, 2 H + 1, n); returns |R| and `|A X| + |F| + |P|`.
 
     blocks (H + 1, n, n) hold A, `force` (G, top + 1) the Fourier coefficients along G directions (`sparse`). Sizes are
     weighted by `weight` per DOF.
@@ -117,36 +117,34 @@ def balance_residual(x, blocks, force, load, directions, weight, parts, sizes):
             for h in range(1, blocks.shape[0]):
                 forces[2 * h - 1, i] += 2.0 * d * force[g, h].real
                 forces[2 * h, i] -= 2.0 * d * force[g, h].imag
-    for k in range(4):
-        sizes[k] = 0.0
+    missing = linears = whole = loads = 0.0
     for r in range(rows):
         for i in range(n):
             parts[0, r, i] = linear[r, i]
             residual[r, i] = linear[r, i] + forces[r, i] - load[r, i]
             w = weight[i] * weight[i]
-            sizes[0] += w * residual[r, i] * residual[r, i]
-            sizes[1] += w * linear[r, i] * linear[r, i]
-            sizes[2] += w * forces[r, i] * forces[r, i]
-            sizes[3] += w * load[r, i] * load[r, i]
-    for k in range(4):
-        sizes[k] = math.sqrt(sizes[k])
+            missing += w * residual[r, i] * residual[r, i]
+            linears += w * linear[r, i] * linear[r, i]
+            whole += w * forces[r, i] * forces[r, i]
+            loads += w * load[r, i] * load[r, i]
+    return math.sqrt(missing), math.sqrt(linears) + math.sqrt(whole) + math.sqrt(loads)
 
 
 @kernel()
-def evaluated(x, blocks, load, directions, weight, laws, motions, table, parts, sizes):
+def evaluated(x, blocks, load, directions, weight, laws, motions, table, parts):
     """A motion at once where all laws are known in closed form (`ClosedLaws`): displacements along the directions into
     `motions` (G, H + 1), spectra into `table` (3, G, top + 1), both zero, and what `balance_residual` gives. Returns
     whether forces and slopes are finite.
     """
     add_displacements(x, directions, motions)
     add_laws(motions, laws, table)
-    balance_residual(x, blocks, table[0], load, directions, weight, parts, sizes)
+    size, scale = balance_residual(x, blocks, table[0], load, directions, weight, parts)
     whole = 0.0
     # a number that is not finite at any instant is in all coefficients
     for part in range(2):
         for g in range(table.shape[1]):
             whole += abs(table[part, g, 0])
-    return math.isfinite(whole)
+    return math.isfinite(whole), size, scale
 
 
 @kernel()

@@ -119,11 +119,6 @@ class Balanced(NamedTuple):
     scale: float
 
 
-def _balanced(parts: Array, sizes: Array) -> Balanced:
-    size, *forces = sizes.tolist()
-    return Balanced(parts[1], parts[2], size, sum(forces))
-
-
 class BalanceState:
     """One evaluated motion: residual, Jacobian and derivatives, each computed when first needed."""
 
@@ -175,13 +170,13 @@ class BalanceState:
             return None
         groups, laws = len(balance.groups), packed.closed(high, balance.top)
         motions, table = np.zeros((groups, high + 1), dtype=complex), np.zeros((3, groups, balance.top + 1), complex)
-        parts, sizes, weight = np.empty((3, *self.x.shape)), np.empty(4), balance.scales()[1]
-        finite = evaluated(
-            self.x, self.blocks, self.load, balance.directions, weight, laws, motions, table, parts, sizes
+        parts, weight = np.empty((3, *self.x.shape)), balance.scales()[1]
+        finite, size, scale = evaluated(
+            self.x, self.blocks, self.load, balance.directions, weight, laws, motions, table, parts
         )
         if not finite:
             self._all_finite(table)
-        return motions, table, _balanced(parts, sizes)
+        return motions, table, Balanced(parts[1], parts[2], size, scale)
 
     @lazy
     def motions(self) -> ComplexArray:
@@ -300,10 +295,9 @@ class BalanceState:
         if known is not None:
             return known[2]
         balance = self.balance
-        parts, sizes = np.empty((3, *self.x.shape)), np.empty(4)
-        weight = balance.scales()[1]
-        balance_residual(self.x, self.blocks, self._spectra[0], self.load, balance.directions, weight, parts, sizes)
-        return _balanced(parts, sizes)
+        parts, weight = np.empty((3, *self.x.shape)), balance.scales()[1]
+        sizes = balance_residual(self.x, self.blocks, self._spectra[0], self.load, balance.directions, weight, parts)
+        return Balanced(parts[1], parts[2], *sizes)
 
     def same_law(self, channel: Channel, one: ComplexArray, other: ComplexArray) -> bool:
         """Whether two spectra of a law's force and slopes (1 + Q, top + 1) differ by what matters nowhere.
@@ -321,7 +315,7 @@ class BalanceState:
         change, size = np.abs(other - one).max(axis=1), np.abs(other).max(axis=1)
         return bool(np.all(weights * change <= SETTLED * (weights * size + matters)))
 
-    @property
+    @lazy
     def driven(self) -> bool:
         """Whether a load or an element sets the phase of the motion."""
         return bool(self.load[1:].any()) or self.balance.system.excited_by_elements

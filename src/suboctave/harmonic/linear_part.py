@@ -163,9 +163,9 @@ class StructuralMatrices(EquationOfMotion):
 
     def stiffness(self, frequency: NDArray[Any], order: int = 0) -> ComplexArray:
         """See `LinearPart.stiffness`."""
-        out: ComplexArray = np.empty((frequency.size, self.size, self.size), dtype=complex)
-        dynamic_stiffness(self._entries, frequency.astype(complex), order, out.reshape(frequency.size, -1))
-        return out
+        out: ComplexArray = np.empty((frequency.size, self.size * self.size), dtype=complex)
+        dynamic_stiffness(self._entries, frequency.astype(complex), order, out)
+        return out.reshape(-1, self.size, self.size)
 
     @lazy
     def _entries(self) -> Array:
