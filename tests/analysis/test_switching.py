@@ -146,7 +146,7 @@ def test_the_branching_equation_in_the_doubled_basis_finds_the_half_odd_null_vec
     x = parent.resized(item.orbit.coefficients, doubled)
     balance = item.orbit.balance.with_basis(doubled)
     vectors = null_vectors(item.orbit.state(), Kind.HALF)
-    phi = doubled_direction(vectors.right * np.tile(balance.scales()[1], len(vectors.right) // size), size, doubled)
+    phi = doubled_direction(vectors.right * np.tile(balance.scales[1], len(vectors.right) // size), size, doubled)
     equation = branching_equation(balance.at(x, item.omega, item.parameters), "omega", 3.2)
     expected = np.append(phi.ravel(), 0.0)
     expected /= np.linalg.norm(equation.weights * expected)

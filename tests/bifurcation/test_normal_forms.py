@@ -15,7 +15,7 @@ from suboctave.timedomain import integrate, shoot
 
 def along(balance, start, first, eps, at, values, omega, name):
     """Newton's method in (X, p) for the motion that is eps further along `first` than `start`: p."""
-    weight = np.tile(balance.scales()[0] ** 2, balance.basis.size)
+    weight = np.tile(balance.scales[0] ** 2, balance.basis.size)
     row = first.ravel() * weight / (first.ravel() @ (weight * first.ravel()))
     begin = start.ravel()
     x = begin + eps * first.ravel()
@@ -32,7 +32,7 @@ def along(balance, start, first, eps, at, values, omega, name):
 
 
 def size_of(b):
-    return np.linalg.norm(b.orbit.coefficients * b.orbit.balance.scales()[0]) or 1.0
+    return np.linalg.norm(b.orbit.coefficients * b.orbit.balance.scales[0]) or 1.0
 
 
 def doubled_motion(b):
@@ -50,7 +50,7 @@ def doubled_curvature(b, share):
     """(p - p_PD) / eps^2 on the doubled branch, eps a share of the motion."""
     state, name = b.orbit.state(), b.parameter_name
     basis, motion, first, second = doubled_motion(b)
-    assert np.sum((first * state.balance.scales()[0]) ** 2) == pytest.approx(1.0)
+    assert np.sum((first * state.balance.scales[0]) ** 2) == pytest.approx(1.0)
     balance = state.balance.with_basis(basis).settle(motion, state.omega, state.values)
     eps, here = share * size_of(b), b.parameter(name)
     at = here + eps**2 * b.normal_form["curvature"]
@@ -61,7 +61,7 @@ def doubled_curvature(b, share):
 def own_curvature(b, share):
     """(p(eps) + p(-eps) - 2 p_0) / (2 eps^2) on the branch that leaves an LP or a pitchfork along phi."""
     state, name = b.orbit.state(), b.parameter_name
-    first = b.null_vectors.right.reshape(state.x.shape) * state.balance.scales()[1]
+    first = b.null_vectors.right.reshape(state.x.shape) * state.balance.scales[1]
     eps, here = share * size_of(b), b.parameter(name)
     both = [along(state.balance, state.x, first, e, here, state.values, state.omega, name) for e in (eps, -eps)]
     return (sum(both) - 2.0 * here) / (2.0 * eps**2)
@@ -269,7 +269,7 @@ def test_decay_towards_a_neimark_sacker_point():
     mu, right = np.linalg.eig(monodromy)
     left = np.linalg.inv(right)[np.argmin(np.abs(mu - np.exp(1j * b.kappa * period)))]
     state = b.orbit.state()
-    phi = b.null_vectors.right.reshape(-1, 2) * state.balance.scales()[1]
+    phi = b.null_vectors.right.reshape(-1, 2) * state.balance.scales[1]
     frequency = np.arange(-9, 10) * state.rate + b.kappa
     wave = np.concatenate((phi.sum(axis=0), 1j * frequency @ phi))
     small, periods = 0.035, 100

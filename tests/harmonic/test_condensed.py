@@ -64,7 +64,7 @@ def test_same_normal_forms(full, condensed_branch):
             continue
         sizes = []
         for b in (one, other):
-            weight = b.orbit.balance.scales()[1]
+            weight = b.orbit.balance.scales[1]
             phi = b.null_vectors.right.reshape(-1, len(weight)) * weight
             sizes.append(b.normal_form["curvature"] / np.sum(np.abs(phi[:, 0]) ** 2))
         assert sizes[0] == pytest.approx(sizes[1], rel=1e-7)

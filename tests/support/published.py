@@ -16,7 +16,7 @@ from suboctave.harmonic.perturbation import Kind, operator, operator_along
 
 def published_vector(state: BalanceState) -> tuple[ComplexArray, Array, float]:
     """phi = phi_R + i phi_I in the basis of the motion, (dimension,), and q, b of its normalisation `q . phi = i b`."""
-    size, scale = state.balance.size, state.balance.scales()[1]
+    size, scale = state.balance.size, state.balance.scales[1]
     waves = null_vectors(state, Kind.FREE, 0.5 * state.rate).right.reshape(-1, size)
     phi = _to_basis(waves * scale).ravel()
     # turned such that phi_R and phi_I are orthogonal, phi_I the longer: q along it leaves room for the phase

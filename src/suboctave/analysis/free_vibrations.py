@@ -77,7 +77,7 @@ def linear_shapes(balance: HarmonicBalance) -> list[Array]:
     mass, _, stiffness = balance.linear.equation_of_motion()
     _, vectors = eigh(0.5 * (stiffness + stiffness.T), 0.5 * (mass + mass.T))
     shapes = list((np.array([balance.linear.expand(unit) for unit in np.eye(balance.size)]) @ vectors).T)
-    weight = balance.scales()[0]
+    weight = balance.scales[0]
     return [s / length(weight * s) for s in shapes if length(weight * s) > 0.0]
 
 

@@ -264,7 +264,7 @@ def _started(linear: _LinearMode, conservative: bool, ranges: Mapping[str, Range
         first, last = (_size_at(linear, measure, value, settings.observe) for value in ranges[measure])
         if not last > 0.0:
             raise InputError(f"the {measure} at rest is larger already")
-        moving = ranges[measure][1] * float(linear.curve.balance.scales()[0].min())
+        moving = ranges[measure][1] * float(linear.curve.balance.scales[0].min())
         if measure == "amplitude" and not moving > _RESTS * last:
             raise InputError(
                 "the observed degree of freedom rests in this mode: choose one that moves, observe=, or give energy="

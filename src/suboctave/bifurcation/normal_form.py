@@ -136,7 +136,7 @@ def with_criticality(form: NormalForm) -> NormalForm:
 
 def unweighted(state: BalanceState, vector: np.ndarray) -> np.ndarray:
     """A null vector in the coefficients' own units."""
-    scale: Array = np.tile(state.balance.scales()[1], len(vector) // state.balance.size)
+    scale: Array = np.tile(state.balance.scales[1], len(vector) // state.balance.size)
     return vector * scale
 
 

@@ -44,10 +44,11 @@ def one_thread() -> Iterator[None]:
             _limits.pop().__exit__(None, None, None)
 
 
-def length(vector: Array) -> float:
-    """Euclidean norm of a real array, without the overhead of `numpy.linalg.norm`."""
-    flat = vector if vector.ndim == 1 else vector.ravel()
-    return math.sqrt(flat.dot(flat))
+@kernel()
+def length(vector):
+    """Euclidean norm of all entries of a real array."""
+    flat = vector.ravel()
+    return math.sqrt(np.dot(flat, flat))
 
 
 @kernel()

@@ -159,7 +159,7 @@ class Augmentation(ABC):
 class Plain(Augmentation):
     """No scalar equation: all motions, along one free parameter."""
 
-    name = "response"
+    name, extras, free_phase = "response", 0, False
 
     def at(self, state: BalanceState, extra: Array, names: tuple[str, ...]) -> NoEquations:
         return NoEquations(state, self)

@@ -49,7 +49,7 @@ def floating(state: BalanceState, unit: float, tolerance: float) -> str | None:
     method.
     """
     balance, size = state.balance, state.balance.size
-    sizes, displacements = _shapes(state.blocks[0].real.tobytes(), balance.scales()[1].tobytes())
+    sizes, displacements = _shapes(state.blocks[0].real.tobytes(), balance.scales[1].tobytes())
     shapes = displacements[sizes <= _ROUNDING * max(float(sizes[0]), state.omega**2)]
     if not len(shapes):
         return None
@@ -62,7 +62,7 @@ def floating(state: BalanceState, unit: float, tolerance: float) -> str | None:
             if near.size > _MISSED * tolerance * near.scale:
                 continue
             change = _moved(state, 2.0 * way * direction).balanced.residual - near.residual
-            if length(change * balance.scales()[1]) <= _EPSILON * near.scale:
+            if length(change * balance.scales[1]) <= _EPSILON * near.scale:
                 return unheld(state, direction)
     return None
 

@@ -104,9 +104,7 @@ class StepGuard(Steps):
             # known now, it explains what was in doubt right before it
             nearest = self.turned.place - _EXAMINED
             known = [u for u in known if u.reason != _RETURNS or u.arclength[0] < nearest]
-        finest, longest = (
-            chosen([found, *step.settled]) for chosen, found in ((min, audit.finest), (max, audit.longest))
-        )
+        finest, longest = min([audit.finest, *step.settled]), max([audit.longest, *step.settled])
         self.audit = Audit(finest, longest, audit.probes + step.probes, audit.refused, tuple(known))
         self.keep(step.samples)
         return step

@@ -130,7 +130,7 @@ def gap_to(orbit: PeriodicOrbit, points: Sequence[BranchPoint], name: str = "", 
         return None
     nu = math.lcm(orbit.basis.nu, *(o.basis.nu for o in orbits))
     top = min(o.basis.harmonics * nu // o.basis.nu for o in (orbit, *orbits))
-    scales = orbit.balance.scales()[0]
+    scales = orbit.balance.scales[0]
     c = _written(orbit, nu, top, scales)
     unit = float(np.linalg.norm(c)) or 1.0
     names = {name: float(np.ptp([o.values[name] for o in orbits])) or 1.0} if name else {}
@@ -212,7 +212,7 @@ def _together(one: PeriodicOrbit, other: PeriodicOrbit) -> tuple[int, ComplexArr
     nu = math.lcm(one.basis.nu, other.basis.nu)
     top = min(o.basis.harmonics * nu // o.basis.nu for o in (one, other))
     # a structure's masses are those of its projection, which may be another one for each
-    a, b = (_written(o, nu, top, one.balance.scales()[0]) for o in (one, other))
+    a, b = (_written(o, nu, top, one.balance.scales[0]) for o in (one, other))
     return nu, a, b, max(float(np.linalg.norm(a)), float(np.linalg.norm(b)))
 
 

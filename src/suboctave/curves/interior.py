@@ -108,7 +108,7 @@ class Steps:
         """The samples that a step from one is foretold from; the last one may have been solved again with other
         harmonics.
         """
-        return [*(s for s in self._behind if s.place < old.place), old]
+        return [*[s for s in self._behind if s.place < old.place], old]
 
     def keep(self, samples: list[Sample]) -> None:
         """The last of these lie behind the next step."""
@@ -337,9 +337,9 @@ class Interior(ABC):
         chosen: list[Sample] = []
         first: Sample | None = None
         samples, last = self.samples, 0.0
-        here, end = samples[start], samples[start].place
+        here, end, known = samples[start], samples[start].place, len(samples)
         for k in range(start + way, start + 7 * way, way):
-            if not 0 <= k < len(samples):
+            if not 0 <= k < known:
                 break
             beyond = samples[k]
             if self.steps.parted(beyond, here) if way < 0 else self.steps.parted(here, beyond):

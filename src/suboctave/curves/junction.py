@@ -60,13 +60,13 @@ def subharmonic_share(curve: MotionProblem, u: Array) -> float:
 def parts_of(curve: MotionProblem, u: Array) -> list[Array]:
     """Harmonics that the motion would not have if it repeated earlier: one array for each prime factor of nu."""
     basis = curve.balance.basis
-    x = u[: curve.balance.dimension].reshape(basis.size, -1) * curve.balance.scales()[0]
+    x = u[: curve.balance.dimension].reshape(basis.size, -1) * curve.balance.scales[0]
     return [x[rows].ravel() for rows in _rows_of_parts(basis.nu, basis.harmonics)]
 
 
 def repeats_earlier(orbit: PeriodicOrbit) -> bool:
     """Whether a motion repeats after a part of the period that it is written with."""
-    basis, scales = orbit.basis, orbit.balance.scales()[0]
+    basis, scales = orbit.basis, orbit.balance.scales[0]
     x = orbit.x.reshape(basis.size, -1) * scales
     least = min((float(np.linalg.norm(x[rows])) for rows in _rows_of_parts(basis.nu, basis.harmonics)), default=np.inf)
     return least <= NOTHING_LEFT * float(np.linalg.norm(x))
@@ -406,7 +406,7 @@ def emanating(doubling: Singular, curve: MotionProblem, weights: Array) -> Array
     """The direction in which a curve of twice the period leaves a period doubling, unit length in its weights."""
     assert doubling.vectors is not None
     state, size = doubling.state, curve.balance.size
-    scale = np.tile(state.balance.scales()[1], len(doubling.vectors.right) // size)
+    scale = np.tile(state.balance.scales[1], len(doubling.vectors.right) // size)
     phi = doubled_direction(doubling.vectors.right * scale, size, curve.balance.basis)
     direction = curve.join(phi, 0.0)
     return direction / length(weights * direction)

@@ -121,7 +121,7 @@ class MotionEvaluation:
         size = balanced.size
         if addition is not None:
             shaped = (state.residual + addition).reshape(state.x.shape)
-            size = length(shaped * state.balance.scales()[1])
+            size = length(shaped * state.balance.scales[1])
         worst = size / max(balanced.scale, self.curve.least_force(state), _TINY)
         return max(worst, *map(abs, values.tolist())) if values.size else worst
 
@@ -249,7 +249,8 @@ class MotionProblem:
 
     def split(self, u: Array) -> tuple[Array, float, Mapping[str, float]]:
         """Coefficients (2 H + 1, size), omega and parameter values of a vector u."""
-        x, own = self.balance.shaped(u[: self.balance.dimension]), self.balance.values
+        balance = self.balance
+        x, own = u[: balance.dimension].reshape(balance.basis.size, balance.size), balance.values
         if self.names == ("omega",) and not self.held:
             return x, float(u[-1]), own
         free = self.named(u)
@@ -298,11 +299,11 @@ class MotionProblem:
 
     def weights(self, u: Array, largest: float) -> Array:
         size = max(self.size(u), LEAST * max(largest, self.reference)) or 1.0
-        weights, n = np.empty(len(u)), self.balance.dimension
+        weights, n = np.empty(u.size), self.balance.dimension
         np.divide(self.balance.column_weights, size, out=weights[:n])
         if self.augmentation.extras:
             weights[n : -len(self.names)] = 1.0 / self.augmentation.spans(self.split(u)[1] / self.balance.basis.nu)
-        for i, (name, span) in enumerate(zip(self.names, self.spans, strict=True), len(u) - len(self.names)):
+        for i, (name, span) in enumerate(zip(self.names, self.spans, strict=True), u.size - len(self.names)):
             value = abs(u[i])
             grown = max(span, value) if name in self.unbounded else span
             weights[i] = 1.0 / (value if self.augmentation.relative else grown)
@@ -343,7 +344,8 @@ class MotionProblem:
         if self.adaptive is not None:
             balance = self._in_basis(self._basis(evaluation, self.adaptive))
         x = state.x if balance is self.balance else self.balance.basis.resized(state.x, balance.basis)
-        balance = balance.settle(x, state.omega, state.values)
+        if not balance.settled:
+            balance = balance.settle(x, state.omega, state.values)
         omega = self.omega
         if self.still and self.steps % CRITICAL_EVERY == 0:
             omega = beyond(balance.system, [(state.recovered[0].real, state.values)], omega)

@@ -230,11 +230,13 @@ class Sample:
         found = []
         # there are few extrema: numbers are quicker than arrays
         for gap in self.gaps:
-            values, level = gap.value.tolist(), gap.level
+            values, level, heights = gap.value.tolist(), gap.level, {}
             most = _YOUNG * max(map(abs, values), default=0.0)
-            turns = enumerate(zip(values, gap.curve.tolist(), strict=True))
-            heights = ((i, level - value if curve > 0.0 else value - level) for i, (value, curve) in turns)
-            found.append({i: height for i, height in heights if 0.0 < height < most})
+            for i, (value, curve) in enumerate(zip(values, gap.curve.tolist(), strict=True)):
+                height = level - value if curve > 0.0 else value - level
+                if 0.0 < height < most:
+                    heights[i] = height
+            found.append(heights)
         return found
 
     @lazy
@@ -425,7 +427,7 @@ class Sample:
             n = state.balance.dimension
             # its columns are in scaled arclength: the weights are those of the DOFs over the size of the motion
             sign, logarithm = self._plain.sign, self._plain.log_determinant
-            logarithm += n * math.log(float(self.point.weights[0]) / float(state.balance.scales()[0][0]))
+            logarithm += n * math.log(float(self.point.weights[0]) / float(state.balance.scales[0][0]))
             masses = state.balance.logarithm_of_masses(n)
         else:
             n = len(self._half.lu)
@@ -440,7 +442,7 @@ class Sample:
         harmonics are two sets then, conjugates of each other, and det J_half is the square of a modulus: pairs on the
         unit circle pass -1 (Swift & Wiesenfeld, Physical Review Letters 52, 1984).
         """
-        weights = self.state.balance.scales()[1]
+        weights = self.state.balance.scales[1]
         odd, largest = np.max([channel.halves(weights) for channel in self.state.channels] or [(0.0, 0.0)], axis=0)
         return bool(odd <= _ROUNDING * largest)
 

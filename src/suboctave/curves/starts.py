@@ -163,7 +163,7 @@ def _at_rest(curve: MotionProblem, value: float) -> BalanceState:
 def _holding_blocks(state: BalanceState) -> ComplexArray:
     """B at the harmonics, (H + 1, size, size): `omega^2 (1 + i k / nu) m` at the multiple k omega / nu."""
     multiples = state.basis.multiples
-    masses = np.diag(state.omega**2 * state.balance.scales()[0] ** 2)
+    masses = np.diag(state.omega**2 * state.balance.scales[0] ** 2)
     return np.asarray((1.0 + 1j * multiples)[:, None, None] * masses, dtype=complex)
 
 
@@ -289,7 +289,7 @@ def _loose(curve: MotionProblem, u: Array) -> Floating | str | None:
     loose = curve.balance.shaped(rows[-1])
     if length(loose[0]) < 0.9:
         return ": an undamped resonance lies there. Give the structure some damping, or go beside it"
-    return Floating(unheld(state, loose[0] * curve.balance.scales()[1]))
+    return Floating(unheld(state, loose[0] * curve.balance.scales[1]))
 
 
 def _like(curve: MotionProblem, adaptive: AdaptiveHarmonics | None, reference: float) -> MotionProblem:

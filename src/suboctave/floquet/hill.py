@@ -136,7 +136,7 @@ def refined(state: BalanceState) -> tuple[BalanceState, BalanceState | None]:
     """
     completed, balance, kept = state.completed, state.balance, state.x.shape[0]
     residual = completed.residual.reshape(completed.x.shape)[:kept].ravel()
-    weight = balance.scales()[0]
+    weight = balance.scales[0]
     lacking = completed.x[kept:]
     size, gap = (float(np.linalg.norm(x * weight)) for x in (state.x, lacking))
     try:

@@ -191,9 +191,10 @@ class Linearised:
         self.missing = (np.sqrt(_ASSURED * self._choice.shifts) * level.sizes)[:, self._kept[: self.own]]
         self._forms, self._turned = forms_along(self._level, self._sequence)
         self._structures = structure(self.spans, self._stretch, self._forms)
-        self._acting = np.empty((len(self.spans), channels), dtype=bool)
-        self._solved = np.empty((len(self.spans), channels * ORDER, size + 1))
-        self._begins = np.empty((len(self.spans), level.states, size + 1))
+        panels = len(self.spans)
+        self._acting = np.empty((panels, channels), dtype=bool)
+        self._solved = np.empty((panels, channels * ORDER, size + 1))
+        self._begins = np.empty((panels, level.states, size + 1))
         self._whole = self._march(self.law, np.zeros(self.base.shape), size + 1)
         self.before, self._start = np.empty((size, size)), np.empty((size, 1))
         closed(self._whole, self._kept, self.before, self._start)
@@ -415,7 +416,7 @@ def _result(motion: Linearised, with_states: Callable[[Linearised], tuple[Comple
         return _no_numbers(motion.state, motion.size + len(mu))
     if motion.own:
         own, own_errors = with_states(motion)
-        mu, errors = np.concatenate((own, mu)), np.concatenate((own_errors, errors))
+        mu, errors = (np.concatenate((own, mu)), np.concatenate((own_errors, errors))) if mu.size else (own, own_errors)
     order = (-np.abs(mu)).argsort(kind="stable")
     return FloquetResult(mu[order], errors[order])
 

@@ -59,9 +59,8 @@ def symmetric_functions(mu: ComplexArray) -> Array:
     `torus` is constant for motions without damping, whose pairs never leave the circle. Complex factors come in
     conjugate pairs: the sign is that of the real ones.
     """
-    out, whole = np.empty((2, 3)), np.zeros((len(mu), len(mu)), dtype=np.int64)
-    for k in range(3):
-        multiply(mu, k, whole, out[:, k : k + 1])
+    out = np.empty((2, 3))
+    _multiplied(mu, out)
     return out
 
 
@@ -96,6 +95,14 @@ def multiply(mu, k, column, out):
                 product[c] = 1.0
     for c in range(out.shape[1]):
         out[1, c] = 0.5 * (out[1, c] + np.log(product[c]))
+
+
+@kernel()
+def _multiplied(mu, out):
+    """fold, double, torus of multipliers (m,) into (2, 3)."""
+    whole = np.zeros((mu.shape[0], mu.shape[0]), dtype=np.int64)
+    for k in range(3):
+        multiply(mu, k, whole, out[:, k : k + 1])
 
 
 def least_factor(mu: ComplexArray) -> Array:

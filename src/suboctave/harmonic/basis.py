@@ -65,7 +65,7 @@ class HarmonicBasis:
     harmonics: Count
     nu: Count = 1
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Number of basis functions, `2 H + 1`: the length of coefficients."""
         return 2 * self.harmonics + 1

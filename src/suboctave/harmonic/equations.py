@@ -179,7 +179,7 @@ class Equations:
 
     def _like(self: _Same, basis: HarmonicBasis, samples: tuple[int | None, ...]) -> _Same:
         # the same mapping of values too: so a motion's values are known to be its own, with what the laws are there
-        _ = self._scales, self.highest_load, self.directions
+        _ = self.scales, self.highest_load, self.directions
         other = type(self).__new__(type(self))
         for name, value in vars(self).items():
             if name not in _OF_BASIS:
@@ -261,7 +261,12 @@ class Equations:
         return np.array((nodes.zr, nodes.zi))
 
     @lazy
-    def _scales(self) -> tuple[Array, Array]:
+    def scales(self) -> tuple[Array, Array]:
+        """Weights of a coefficient of displacement and of a residual entry per DOF, `sqrt(m_i)` and its inverse.
+
+        `m_i` is the mass that a DOF shows to a sudden force, `1 / (M^-1)_ii`. The weights make norms independent of
+        the units of single DOFs. Shape (size,) each.
+        """
         mass = self.linear.equation_of_motion()[0]
         shapes = np.array([self.linear.expand(unit) for unit in np.eye(self.size)])
         mobility = np.einsum("ij,ji->i", shapes, np.linalg.solve(mass, shapes.T))
@@ -270,29 +275,21 @@ class Equations:
         weight = 1.0 / np.sqrt(mobility)
         return weight, 1.0 / weight
 
-    def scales(self) -> tuple[Array, Array]:
-        """Weights of a coefficient of displacement and of a residual entry per DOF, `sqrt(m_i)` and its inverse.
-
-        `m_i` is the mass that a DOF shows to a sudden force, `1 / (M^-1)_ii`. The weights make norms independent of
-        the units of single DOFs. Shape (size,) each.
-        """
-        return self._scales
-
     def row_weights(self, rows: int) -> Array:
         """The weights of residual entries (`scales`) for as many rows of an operator."""
         weights = self._row_weights.get(rows)
         if weights is None:
-            weights = self._row_weights[rows] = np.tile(self.scales()[1], rows // self.size)
+            weights = self._row_weights[rows] = np.tile(self.scales[1], rows // self.size)
         return weights
 
     def logarithm_of_masses(self, rows: int) -> float:
         """Sum of the logarithms of `sqrt(m_i)` (`scales`) over as many rows of an operator."""
-        return rows // self.size * float(np.log(self.scales()[0]).sum())
+        return rows // self.size * float(np.log(self.scales[0]).sum())
 
     @lazy
     def column_weights(self) -> Array:
         """The weights of displacements (`scales`) for all coefficients, shape (dimension,)."""
-        return self.per_unknown(self.scales()[0])
+        return self.per_unknown(self.scales[0])
 
 
 #: what a basis and samples have their own of

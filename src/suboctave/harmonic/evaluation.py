@@ -135,6 +135,8 @@ class BalanceState:
         #: circular frequencies of the harmonics, (H + 1,)
         self.frequencies = balance.basis.multiples * omega
         self.laws: Laws = balance.laws(values)
+        #: the laws of all groups that are known in closed form, as arrays
+        self.packed: PackedLaws = self.laws.packed
 
     @lazy
     def blocks(self) -> ComplexArray:
@@ -157,11 +159,6 @@ class BalanceState:
         """See `LoadSpectrum.waves`."""
         return self.balance.loads.waves({**self.values, "omega": self.omega})
 
-    @property
-    def packed(self) -> PackedLaws:
-        """The laws of all groups that are known in closed form, as arrays."""
-        return self.laws.packed
-
     @lazy
     def _at_once(self) -> tuple[ComplexArray, ComplexArray, Balanced] | None:
         """Displacements, spectra, and what balances, where all laws are known in closed form; else None."""
@@ -170,7 +167,7 @@ class BalanceState:
             return None
         groups, laws = len(balance.groups), packed.closed(high, balance.top)
         motions, table = np.zeros((groups, high + 1), dtype=complex), np.zeros((3, groups, balance.top + 1), complex)
-        parts, weight = np.empty((3, *self.x.shape)), balance.scales()[1]
+        parts, weight = np.empty((3, *self.x.shape)), balance.scales[1]
         finite, size, scale = evaluated(
             self.x, self.blocks, self.load, balance.directions, weight, laws, motions, table, parts
         )
@@ -295,7 +292,7 @@ class BalanceState:
         if known is not None:
             return known[2]
         balance = self.balance
-        parts, weight = np.empty((3, *self.x.shape)), balance.scales()[1]
+        parts, weight = np.empty((3, *self.x.shape)), balance.scales[1]
         sizes = balance_residual(self.x, self.blocks, self._spectra[0], self.load, balance.directions, weight, parts)
         return Balanced(parts[1], parts[2], *sizes)
 
@@ -307,7 +304,7 @@ class BalanceState:
         the direction shows. No law is known better than to its own rounding. A law that hardly acts may so be rounding
         itself.
         """
-        weight = self.balance.scales()[1]
+        weight = self.balance.scales[1]
         out, ins = length(weight * channel.out), np.linalg.norm(weight * channel.ins, axis=1)
         rates = [self.rate**2, self.rate][: 1 + channel.moving]
         weights = np.append(out, np.tile(out * ins, len(rates)))
@@ -492,7 +489,7 @@ class BalanceState:
     @lazy
     def squares(self) -> Array:
         """Squares of the sizes of the harmonics 0 .. 2 H + 1, with the weights of displacements (`scales`)."""
-        weight = self.balance.scales()[0] ** 2
+        weight = self.balance.scales[0] ** 2
         rows, lacking = (self.x * self.x) @ weight, self.neglected
         beyond = (lacking.real**2 + lacking.imag**2) @ weight
         return np.concatenate((rows[:1], rows[1::2] + rows[2::2], beyond))

@@ -99,7 +99,7 @@ class PeriodicOrbit(Motion):
     @property
     def own_period(self) -> int:
         """After how many load periods the motion first repeats; `basis.nu` unless its sub-harmonics vanish."""
-        nu, sizes = self.basis.nu, np.linalg.norm(to_complex(self.x) * self.balance.scales()[0], axis=1)
+        nu, sizes = self.basis.nu, np.linalg.norm(to_complex(self.x) * self.balance.scales[0], axis=1)
         k = np.arange(len(sizes))
         shares = ((d, float(np.linalg.norm(sizes[k % (nu // d) != 0]))) for d in range(1, nu) if nu % d == 0)
         return next((d for d, rest in shares if rest <= _REPEATED * np.linalg.norm(sizes)), nu)

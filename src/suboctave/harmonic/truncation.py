@@ -81,7 +81,7 @@ class AdaptiveHarmonics:
 
 def motion_size(state: BalanceState) -> float:
     """Size of a motion with the DOF weights of `HarmonicBalance.scales`."""
-    return length(state.x * state.balance.scales()[0])
+    return length(state.x * state.balance.scales[0])
 
 
 def truncation(state: BalanceState) -> float:
@@ -137,7 +137,7 @@ def holding(balance: HarmonicBalance, spectrum: ComplexArray, options: AdaptiveH
     twice = 2 * _USUAL + 1
     few = options.maximum is None and balance.size * (2 * twice * nu + 1) <= _FEW_UNKNOWNS
     most = twice if few else min(options.usual, (_MOST_UNKNOWNS / balance.size - 1) / (2 * nu))
-    sizes = np.linalg.norm(spectrum * balance.scales()[0], axis=1)
+    sizes = np.linalg.norm(spectrum * balance.scales[0], axis=1)
     left_out = np.sqrt(np.cumsum(sizes[::-1] ** 2))[::-1]
     rungs = _rungs(max(options.minimum, balance.highest_load), most, options.usual)
     enough = (h for h in rungs if h * nu + 1 >= len(sizes) or left_out[h * nu + 1] <= options.tolerance * left_out[0])

@@ -16,20 +16,20 @@ from suboctave.harmonic.evaluation import BalanceState
 
 def sizes_of(state: BalanceState) -> tuple[float, float]:
     """Sizes of the forces and of the motion, those of rest taken for one."""
-    weight = state.balance.per_unknown(state.balance.scales()[0])
+    weight = state.balance.per_unknown(state.balance.scales[0])
     return state.balanced.scale or 1.0, length(weight * state.x.ravel()) or 1.0
 
 
 def row_factors(state: BalanceState, force: float) -> Array:
     """What the rows of R are multiplied by, (dimension,)."""
-    masses = state.balance.per_unknown(state.balance.scales()[1])
+    masses = state.balance.per_unknown(state.balance.scales[1])
     waves = np.repeat(state.basis.multiples[(np.arange(state.basis.size) + 1) // 2], state.balance.size)
     return np.asarray(masses / (force * (1.0 + waves**2)))
 
 
 def column_sizes(state: BalanceState, size: float) -> Array:
     """The units of X, (dimension,)."""
-    return np.asarray(size / state.balance.per_unknown(state.balance.scales()[0]))
+    return np.asarray(size / state.balance.per_unknown(state.balance.scales[0]))
 
 
 def with_harmonics(vector: Array, count: int, rest: int) -> Array:

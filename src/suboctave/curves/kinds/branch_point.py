@@ -82,7 +82,7 @@ class BranchPointEquations(Equations):
     ) -> None:
         self.of, self.state, self.beta, self.names = of, state, beta, names
         self._border = border
-        self._unit = 1.0 / np.tile(state.balance.scales()[1], state.basis.size)
+        self._unit = 1.0 / np.tile(state.balance.scales[1], state.basis.size)
         self.column = of.force * of.borders.left * self._unit
         self.addition = beta * self.column
 

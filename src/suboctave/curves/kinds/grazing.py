@@ -33,7 +33,7 @@ class GrazingContactEquations(Augmentation):
     @classmethod
     def of(cls, state: BalanceState, element: int, index: int) -> GrazingContactEquations:
         """With the unit of a motion."""
-        return cls(element, index, motion_size(state) / float(np.max(state.balance.scales()[0])) or 1.0)
+        return cls(element, index, motion_size(state) / float(np.max(state.balance.scales[0])) or 1.0)
 
     @classmethod
     def through(

@@ -60,7 +60,7 @@ class LimitCycle(Augmentation):
         """The reference's oscillation, weighted as `oscillating`, and the derivative of the phase condition by X,
         (dimension,): the same at all motions of a discretisation.
         """
-        weights, known = state.balance.scales()[0], vars(self).get("_condition")
+        weights, known = state.balance.scales[0], vars(self).get("_condition")
         if known is None or known[0] is not weights:
             reference = self.reference * weights
             reference[0] = 0.0
@@ -77,7 +77,7 @@ class LimitCycle(Augmentation):
 
 def oscillating(state: BalanceState) -> Array:
     """The coefficients of a motion but its mean, weighted by the square roots of the masses."""
-    x: Array = state.x * state.balance.scales()[0]
+    x: Array = state.x * state.balance.scales[0]
     x[0] = 0.0
     return x
 

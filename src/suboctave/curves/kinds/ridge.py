@@ -79,7 +79,7 @@ class RidgeEquations(Equations):
     @lazy
     def _sizes(self) -> Array:
         """Units of the coefficients and of the first parameter."""
-        weight = self.state.balance.per_unknown(self.state.balance.scales()[0])
+        weight = self.state.balance.per_unknown(self.state.balance.scales[0])
         size = length(weight * self.state.x.ravel()) or 1.0
         return np.append(size / weight, self.of.along)
 

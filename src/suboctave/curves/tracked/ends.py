@@ -303,7 +303,7 @@ def is_lopsided(sample: Sample) -> bool:
 
 def _unsymmetric_share(state: BalanceState) -> float:
     """Share of mean and even harmonics in a motion."""
-    x = state.x * state.balance.scales()[0]
+    x = state.x * state.balance.scales[0]
     return float(np.linalg.norm(_even(x))) / (float(np.linalg.norm(x)) or 1.0)
 
 
