@@ -467,11 +467,7 @@ def _overshot(point: CurvePoint, new: CurvePoint) -> bool:
 
     The corner lies where the tangents meet: `new - point = d a + s b` with unit tangents a and b; s is negative then.
     """
-    a, b, way = (new.weights * vector for vector in (point.tangent, new.tangent, new.u - point.u))
-    a, b = a / length(a), b / length(b)
-    cosine_between = float(a @ b)
-    sine_squared = 1.0 - cosine_between**2
-    return sine_squared >= _STRAIGHT and float(way @ b) < cosine_between * float(way @ a)
+    return beyond_meeting(point.tangent, new.tangent, new.u - point.u, new.weights) >= _STRAIGHT
 
 
 def _leaving(point: CurvePoint, new: CurvePoint) -> CurvePoint:
@@ -485,7 +481,27 @@ def _leaving(point: CurvePoint, new: CurvePoint) -> CurvePoint:
 
 def _angle(a: CurvePoint, b: CurvePoint) -> float:
     """Angle between the tangents of two points, radians."""
-    return math.acos(min(1.0, max(-1.0, cosine(a.tangent, b.tangent, b.weights))))
+    return angle(a.tangent, b.tangent, b.weights)
+
+
+@kernel()
+def angle(a, b, weights):
+    """Angle between two vectors in scaled variables, radians."""
+    return math.acos(min(1.0, max(-1.0, cosine(a, b, weights))))
+
+
+@kernel()
+def beyond_meeting(a, b, way, weights):
+    """Squared sine of the angle between the tangents a and b at the two ends of a way in scaled variables, where these
+    meet beyond its end; -1 elsewhere.
+    """
+    sizes = length(weights * a), length(weights * b)
+    one, other, between = np.empty(len(a)), np.empty(len(a)), weights * way
+    for i in range(len(a)):
+        one[i], other[i] = weights[i] * a[i] / sizes[0], weights[i] * b[i] / sizes[1]
+    cosine_between = np.dot(one, other)
+    overshot = np.dot(between, other) < cosine_between * np.dot(between, one)
+    return 1.0 - cosine_between**2 if overshot else -1.0
 
 
 @kernel()

@@ -330,9 +330,17 @@ def _pairs_change(p: Sample, q: Sample) -> bool:
 def _disagreement(a: CurvePoint, b: CurvePoint) -> float:
     """Distance between the chord and the mean tangent of a step, in units of its length."""
     u, heading = b.curve.transfer(a.u, a.curve), b.curve.transfer(a.tangent, a.curve)
-    scaled = [b.weights * vector for vector in (b.u - u, heading, b.tangent)]
-    chord, first, last = (vector / (length(vector) or 1.0) for vector in scaled)
-    return length(chord - 0.5 * (first + last)) if chord.any() else 0.0
+    return _apart(b.u - u, heading, b.tangent, b.weights)
+
+
+@kernel()
+def _apart(chord, first, last, weights):
+    """Distance between the unit vector along one vector in scaled variables and the mean of those along two others."""
+    sizes, out = (length(weights * chord), length(weights * first), length(weights * last)), np.empty(len(chord))
+    for i in range(len(chord)):
+        mean = 0.5 * (weights[i] * first[i] / (sizes[1] or 1.0) + weights[i] * last[i] / (sizes[2] or 1.0))
+        out[i] = weights[i] * chord[i] / (sizes[0] or 1.0) - mean
+    return length(out) if sizes[0] > 0.0 else 0.0
 
 
 def _explained(p: Sample, q: Sample) -> bool:

@@ -95,7 +95,7 @@ class Steps:
 
     def parted(self, p: Sample, q: Sample) -> bool:
         """Whether the functions looked at do not go on smoothly from one sample to a later one."""
-        return self.grazes(p, q)
+        return self.contacts(p, q).grazes is not None
 
     def contacts(self, p: Sample, q: Sample) -> Contacts:
         """What contacts do between two samples."""

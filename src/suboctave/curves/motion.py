@@ -30,7 +30,7 @@ from suboctave.floquet.result import FloquetResult
 from suboctave.harmonic.basis import HarmonicBasis
 from suboctave.harmonic.energy import fed
 from suboctave.harmonic.evaluation import BalanceState, HarmonicBalance
-from suboctave.harmonic.finite import infinite_between, unbounded_along, unbounded_between
+from suboctave.harmonic.finite import infinite_between, quotients, unbounded_along, unbounded_between
 from suboctave.harmonic.truncation import (
     AdaptiveHarmonics,
     beyond_usual,
@@ -257,9 +257,13 @@ class MotionProblem:
         omega = free.pop("omega", self.omega)
         return x, omega, {**own, **self.held, **free} if free or self.held else own
 
+    @lazy
+    def _extra(self) -> slice:
+        return slice(self.balance.dimension, -len(self.names))
+
     def extra(self, u: Array) -> Array:
         """The unknowns of the augmentation in a vector u."""
-        return u[self.balance.dimension : -len(self.names)]
+        return u[self._extra]
 
     def join(self, x: Array, values: float | Array, extra: Array | None = None) -> Array:
         """The vector u of coefficients, the free parameters, and extra unknowns."""
@@ -281,7 +285,7 @@ class MotionProblem:
         x, omega, values = self.split(u)
         if not omega > 0.0:
             raise ConvergenceError("omega is not positive")
-        extra = self.extra(u)
+        extra = u[self._extra]
         try:
             state = self.balance.state(x, omega, values)
         except InputError as failure:
@@ -315,11 +319,14 @@ class MotionProblem:
 
     def severed(self, point: CurvePoint, u: Array, evaluation: Evaluation | None = None) -> str | None:
         """Where a force is not finite between a motion and u, or along that, in words; see `Curve`."""
-        system, own = self.balance.system, {**self.balance.values, "omega": self.omega}
-        ends = ({**own, **self.named(at)} for at in (point.u, u))
-        infinite = infinite_between(system, self.names, *ends)
-        if infinite is not None or self.balance.settled:
-            return infinite
+        system = self.balance.system
+        if quotients(system, self.names):
+            own = {**self.balance.values, "omega": self.omega}
+            infinite = infinite_between(system, self.names, *({**own, **self.named(at)} for at in (point.u, u)))
+            if infinite is not None:
+                return infinite
+        if self.balance.settled:
+            return None
         assert isinstance(point.evaluation, MotionEvaluation)
         assert evaluation is None or isinstance(evaluation, MotionEvaluation)
         try:

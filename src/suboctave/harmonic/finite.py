@@ -61,7 +61,7 @@ def _laws(state: BalanceState) -> Iterator[tuple[GeneralLaw, Member]]:
 
 
 @lru_cache(maxsize=32)
-def _quotients(system: System, names: tuple[str, ...]) -> list[tuple[str, Coefficient]]:
+def quotients(system: System, names: tuple[str, ...]) -> list[tuple[str, Coefficient]]:
     """The coefficients of a system that depend on some parameters and may be infinite, with where they stand."""
     return [(where, c) for where, c, _ in system.expressions() if c.names.intersection(names) and c.may_be_infinite]
 
@@ -70,7 +70,7 @@ def infinite_between(
     system: System, names: tuple[str, ...], first: Mapping[str, float], last: Mapping[str, float]
 ) -> str | None:
     """Which coefficient is not finite between two values of some parameters, in words; None if all are finite."""
-    for where, source in _quotients(system, names):
+    for where, source in quotients(system, names):
 
         def values(shares: Array, source: Coefficient = source) -> Array:
             return np.array([_value(source, first, last, names, share) for share in shares.tolist()])
