@@ -31,7 +31,7 @@ import numpy as np
 
 from suboctave.bifurcation.bifurcation import CONTACT_KINDS, Bifurcation
 from suboctave.bifurcation.bordered import bordered, weighted_operator
-from suboctave.bifurcation.gaps import GrazingContact, gap_extrema, height_at, stiffness_jump
+from suboctave.bifurcation.gaps import GrazingContact, gap_extrema, height_at, level_of, stiffness_jump
 from suboctave.bifurcation.measures import upper
 from suboctave.continuation.linear import Factor
 from suboctave.continuation.newton import correct
@@ -57,6 +57,8 @@ _NEAR = 0.05
 _REACH = 0.01
 #: the same for one that is bracketed only
 _BRACKETED = 1e-3
+#: how many times as far as a grazing lies the first correction of Newton's method to it may lead
+_FORETOLD = 4.0
 #: way behind a grazing at which a test function is first looked at, and secants in its root
 _FIRST, _SECANTS = 1e-8, 3
 #: change of kappa, in units of the base frequency, that tells how det J_kappa depends on it
@@ -72,7 +74,8 @@ def layer_of(kind: BifurcationKind, solution: Singular, guess: Guess) -> Grazing
     if solution.vectors is None:
         return None
     best: GrazingContact | None = None
-    for touch, grazing, distance in _grazings_near(replace(guess, state=solution.state), young=True):
+    here = replace(guess, state=solution.state)
+    for touch, grazing, distance in _solved(here, _touches_near(here, young=True)):
         if best is not None and distance >= best.distance:
             continue
         if _exponent(kind, solution, grazing, guess) < _SQUARE_ROOT:
@@ -149,11 +152,8 @@ def _grazing_moved(start: Guess, contact: GrazingContact) -> float:
     there is none as far as what the motion leaves out, in units of the parameter.
     """
     own = contact.element, contact.gap
-    places = [
-        start.value(grazing.state)
-        for touch, grazing, _ in _grazings_near(start, young=False)
-        if (touch.element, touch.contact(grazing, start.name).gap) == own
-    ]
+    touches = [touch for touch in _touches_near(start, young=False) if _gap_of(touch, start.state) == own]
+    places = [start.value(grazing.state) for _, grazing, _ in _solved(start, touches)]
     moved = (abs(place - contact.parameter) for place in places)
     return min(moved, default=truncation(start.state) * abs(start.parameter))
 
@@ -264,8 +264,44 @@ def _side(kind: str, floquet: FloquetResult) -> bool:
 
 def _beside(guess: Guess, limit: float) -> list[tuple[Touch, Grazing, float]]:
     """Grazings up to some way off, the nearest first."""
-    near = [item for item in _grazings_near(guess, young=False) if item[2] <= limit]
+    foretold = _foretold(guess, _touches_near(guess, young=False), _FORETOLD * limit)
+    near = [item for item in _solved(guess, foretold) if item[2] <= limit]
     return sorted(near, key=lambda item: item[2])
+
+
+def _foretold(guess: Guess, touches: list[Touch], limit: float) -> list[Touch]:
+    """Those extrema whose grazing lies up to some way off, by the first correction of Newton's method to each.
+
+    One factorisation serves all: along a curve an extremum rises at a rate that its tangent tells.
+    """
+    if not touches:
+        return []
+    state, weights = guess.state, _weights(guess.state, guess)
+    rises = [_rise(state, touch, guess.name) for touch in touches]
+    row = rises[0][1] / weights
+    factor, rows = _bordered(state, guess, weights, row)
+    if factor.singular:
+        return touches
+    size = len(row)
+    along, off = factor.solve(np.eye(1, size, size - 1)[0]), factor.solve(np.append(-state.residual * rows, 0.0))
+    kept = []
+    for touch, (height, rise) in zip(touches, rises, strict=True):
+        rate = float(rise / weights @ along)
+        left = height + float(rise / weights @ off)
+        if rate != 0.0 and np.linalg.norm(off - left / rate * along) <= limit:
+            kept.append(touch)
+    return kept
+
+
+def _rise(state: BalanceState, touch: Touch, name: str) -> tuple[float, Array]:
+    """Height of an extremum over its gap, and its gradient by coefficients and free parameter, (dimension + 1,)."""
+    height = height_at(state, touch.element, touch.index, touch.tau, (name,))
+    return height.height, np.append(height.by_x, height.by_names)
+
+
+def _gap_of(touch: Touch, state: BalanceState) -> tuple[int, float]:
+    """The element whose gap an extremum passes, and the gap."""
+    return touch.element, level_of(state.local(touch.element), touch.index)
 
 
 def _start(kind: BifurcationKind, touch: Touch, grazing: Grazing, guess: Guess) -> Guess | None:
@@ -307,25 +343,29 @@ def _way_behind(touch: Touch, grazing: Grazing, guess: Guess) -> Array | None:
     """
     state = grazing.state
     weights = _weights(state, guess)
-    dimension = state.balance.dimension
-    rows = state.balance.row_weights(dimension) / max(state.balanced.scale, np.finfo(float).tiny)
-    matrix = np.zeros((dimension + 1, dimension + 1), order="F")
-    matrix[:-1, :-1] = state.jacobian * rows[:, None] / weights[:-1]
-    matrix[:-1, -1] = state.residual_by(guess.name) * rows / weights[-1]
     rise = touch.rise(grazing, guess.name) / weights
-    matrix[-1] = rise / np.linalg.norm(rise)
-    factor = Factor.of(matrix, overwrite=True)
+    factor, _ = _bordered(state, guess, weights, rise)
     if factor.singular:
         return None
     # along it the extremum rises through the gap at a rate of one: an excursion is a maximum above, a minimum below
-    tangent = factor.solve(np.eye(1, dimension + 1, dimension)[0])
+    tangent = factor.solve(np.eye(1, len(rise), len(rise) - 1)[0])
     tangent *= (1.0 if touch.maximum else -1.0) / np.linalg.norm(tangent)
     return np.asarray(tangent / weights)
 
 
-def _grazings_near(guess: Guess, young: bool) -> Iterator[tuple[Touch, Grazing, float]]:
-    """Grazings of exact contacts beside a motion, with the way there; `young`: only of contacts that are, and young."""
-    state = guess.state
+def _bordered(state: BalanceState, guess: Guess, weights: Array, row: Array) -> tuple[Factor, Array]:
+    """The equations' derivatives above a row, both scaled, factorised; the weights of the equations."""
+    dimension = state.balance.dimension
+    rows = state.balance.row_weights(dimension) / max(state.balanced.scale, np.finfo(float).tiny)
+    matrix = np.empty((dimension + 1, dimension + 1), order="F")
+    matrix[:-1] = state.extended_jacobian(guess.name) * rows[:, None] / weights
+    matrix[-1] = row / np.linalg.norm(row)
+    return Factor.of(matrix, overwrite=True), rows
+
+
+def _touches_near(guess: Guess, young: bool) -> list[Touch]:
+    """Extrema beside the gaps of exact contacts on a motion; `young`: only of contacts that are, and young."""
+    state, found = guess.state, list[Touch]()
     mass = state.linear.equation_of_motion()[0]
     for gap in gap_extrema(state):
         acting = state.linear.expand(state.balance.group_of[gap.element].direction)
@@ -343,12 +383,18 @@ def _grazings_near(guess: Guess, young: bool) -> Iterator[tuple[Touch, Grazing, 
             force = stiffness * mobility * abs(beyond / curve) / state.rate**2
             if young and (beyond * curve > 0.0 or force > _YOUNG):
                 continue
-            touch = Touch(gap.element, gap.index, float(tau), 0.5, bool(curve < 0.0), bool(beyond > 0.0))
-            try:
-                grazing = touch.solve(guess)
-            except ConvergenceError:
-                continue
-            yield touch, grazing, float(np.linalg.norm(_chord(grazing.state, state, guess)))
+            found.append(Touch(gap.element, gap.index, float(tau), 0.5, bool(curve < 0.0), bool(beyond > 0.0)))
+    return found
+
+
+def _solved(guess: Guess, touches: list[Touch]) -> Iterator[tuple[Touch, Grazing, float]]:
+    """The grazings of extrema beside a motion, with the way there."""
+    for touch in touches:
+        try:
+            grazing = touch.solve(guess)
+        except ConvergenceError:
+            continue
+        yield touch, grazing, float(np.linalg.norm(_chord(grazing.state, guess.state, guess)))
 
 
 def _weights(state: BalanceState, guess: Guess) -> Array:
