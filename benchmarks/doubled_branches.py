@@ -207,8 +207,10 @@ def main() -> int:
                 for warning in item.branch.warnings:
                     print(f"           note: {warning}")
         sys.stdout.flush()
-        total.update(systems=1, doublings=row.doublings, faulty=bool(row.faults), notes=row.warnings, stopped=stopped)
-        total.update(zip(("arrive", "leave", "close"), numbers, strict=True))
+        total.update(
+            systems=1, doublings=row.doublings, faulty=int(bool(row.faults)), notes=row.warnings, stopped=stopped
+        )
+        total.update(dict(zip(("arrive", "leave", "close"), numbers, strict=True)))
     print("\nin all: " + ", ".join(f"{value} {what}" for what, value in total.items()))
     print("faults: " + (", ".join(f"{value} {what}" for what, value in kinds.items()) or "none"))
     return 1 if kinds else 0

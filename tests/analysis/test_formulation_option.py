@@ -180,7 +180,4 @@ def test_the_count_says_in_words_that_it_should_have_changed(two):
 class _Sample:
     def __init__(self, floquet):
         self.floquet = floquet
-        self.unstable = floquet.unstable
-
-    def outside(self, completed):
-        return self.unstable
+        self.unstable = self.outside = floquet.unstable

@@ -29,8 +29,8 @@ from suboctave.continuation.point import CurvePoint
 from suboctave.continuation.problem import Array
 from suboctave.curves.events.monitors import BRANCH_POINT, BifurcationKind, Located, NeimarkSacker, changes
 from suboctave.curves.interior import FINEST, Interior, Steps, unsettled
-from suboctave.curves.sample import Sample, compare, completed
-from suboctave.curves.trace import Audit
+from suboctave.curves.sample import Sample, compare, resolved
+from suboctave.curves.trace import UNRESOLVED, Audit
 from suboctave.floquet.held import of_those_moved
 from suboctave.floquet.result import FloquetResult
 from suboctave.floquet.symmetric import in_rings, symmetric_functions
@@ -191,13 +191,16 @@ class GuardedStep(Interior):
         crossing = self._look_for_crossing(p, q)
         if self.refused:
             return None
-        eventful = compare(p, q).change != 0 or bool(changes(p, q))
+        told = resolved(p, q)
+        eventful = told and (compare(p, q).change != 0 or bool(changes(p, q)))
         doubt = self._doubt_at_event(p, q, crossing) if eventful else None
         if doubt is not None:
             return doubt
         doubt = super().doubt(p, q)
-        if doubt is None and h > _EXAMINED and _too_fast(p, q, eventful):
+        if doubt is None and told and h > _EXAMINED and _too_fast(p, q, eventful):
             return 0.5, "multipliers move too fast to be followed"
+        if doubt is None and not told:
+            self.unsettled.append(unsettled(p, q, UNRESOLVED))
         # right beside a branch point at which the curve turns the multiplier at +1 is known up to its error only
         return None if doubt is not None and doubt[1] == _RETURNS and h <= _EXAMINED and self.turned else doubt
 
@@ -206,14 +209,14 @@ class GuardedStep(Interior):
         if not all(self._confirmed(kind, p, q) for kind in changes(p, q) if kind.multiplicity > 1):
             return 0.5, _TOGETHER
         if not _explained(p, q):
-            before, now = (one.outside(completed(p, q)) for one in (p, q))
+            before, now = p.outside, q.outside
             return 0.5, (
                 f"the number of unstable multipliers changes from {before} to {now}, which no bifurcation there "
                 "explains"
             )
         if self._mixed(p, q):
             return 0.5, "a pair of multipliers may cross the unit circle together with a real one"
-        turns = [self.measures(one, completed(p, q))[0, 0] for one in (p, q)]
+        turns = [self.measures(one)[0, 0] for one in (p, q)]
         return (0.5, _BESIDE) if crossing is not None and turns[0] != turns[1] else None
 
     def _mixed(self, p: Sample, q: Sample) -> bool:
@@ -269,21 +272,21 @@ class GuardedStep(Interior):
         """See `Interior.tests`: of equal multipliers with one, where there are as many all along. A family that passes
         the circle in the same step as a single one would go unseen, its zero being double.
         """
-        which = completed(*stencil)
-        tests = [self.measures(one, which) for one in stencil]
-        if self.turned or not stencil[0].told(which).repeated or not _families(told := _told(stencil)):
+        tests = [self.measures(one) for one in stencil]
+        if not resolved(*stencil):
+            # but for the turn, which the curve itself tells
+            return [one[:, :1] for one in tests]
+        if self.turned or not stencil[0].floquet.repeated or not _families(told := _told(stencil)):
             return tests
         own = (symmetric_functions(one.distinct) for one in told)
         return [np.column_stack((one[:, :1], functions)) for one, functions in zip(tests, own, strict=True)]
 
-    def measures(self, sample: Sample, which: bool) -> Array:
-        """The tests at a sample, of the completed motion or as it stands, without their zeros at a branch point at
-        which the curve turns back.
-        """
+    def measures(self, sample: Sample) -> Array:
+        """The tests at a sample, without their zeros at a branch point at which the curve turns back."""
         crossing = self.turned
         if crossing is None or crossing.turned is None:
-            return sample.measures(which)
-        tests = sample.measures(which).copy()
+            return sample.measures
+        tests = sample.measures.copy()
         way = sample.place - crossing.place or math.ulp(1.0)
         change = tests[0, 1] * math.exp(tests[1, 1]) - crossing.turned
         tests[0, 0] *= math.copysign(1.0, way)
@@ -305,9 +308,8 @@ _REASONS = (
 
 
 def _told(stencil: Sequence[Sample]) -> list[FloquetResult]:
-    """The multipliers that tests compare at the samples of a stencil."""
-    which = completed(*stencil)
-    return [one.told(which) for one in stencil]
+    """The multipliers at the samples of a stencil."""
+    return [one.floquet for one in stencil]
 
 
 def _families(told: Sequence[FloquetResult]) -> bool:
@@ -323,8 +325,7 @@ def _open(p: Sample, q: Sample) -> bool:
 
 def _pairs_change(p: Sample, q: Sample) -> bool:
     """Whether the product of all pairs changes its sign."""
-    which = completed(p, q)
-    return bool(p.measures(which)[0, -1] != q.measures(which)[0, -1])
+    return bool(p.measures[0, -1] != q.measures[0, -1])
 
 
 def _disagreement(a: CurvePoint, b: CurvePoint) -> float:

@@ -81,9 +81,6 @@ class Sample:
         self.curve = point.curve
         self.evaluation = point.evaluation
         self.state: BalanceState = point.evaluation.state
-        #: by whether they are those of the completed motion
-        self._measures: dict[bool, Array] = {}
-        self._outside: dict[bool, int] = {}
 
     def at(self, point: CurvePoint) -> Sample:
         """Another point, with multipliers by the same method."""
@@ -181,22 +178,22 @@ class Sample:
         """Whether the motion counts as rest, where its curve can tell."""
         return self.evaluation.at_rest
 
-    def told(self, completed: bool) -> FloquetResult:
-        """Multipliers of the completed motion, or of the motion as it stands."""
-        return self.floquet if completed else self.standing
-
-    def outside(self, completed: bool) -> int:
+    @lazy
+    def outside(self) -> int:
         """Number of multipliers outside the unit circle, real ones on the side on which det J_0 and det J_half have
         them: the count and the tests of LP, BP and PD then change together.
         """
-        if completed not in self._outside:
-            known = self.told(completed)
-            count = known.unstable
-            if not (self.at_rest or self.finer is not None):
-                for which, _ in measures.contradicted(known, self._integer_sign, self.half_sign):
-                    count += 1 if abs(known.multipliers[which]) <= 1.0 else -1
-            self._outside[completed] = count
-        return self._outside[completed]
+        known = self.floquet
+        count = known.unstable
+        if not (self.at_rest or self.finer is not None):
+            for which, _ in measures.contradicted(known, self._integer_sign, self.half_sign):
+                count += 1 if abs(known.multipliers[which]) <= 1.0 else -1
+        return count
+
+    @property
+    def beyond(self) -> int:
+        """Beyond how many of +1 and -1 an odd number of real multipliers lies, as det J_0 and det J_half have it."""
+        return (self._integer_sign < 0.0) + (self.half_sign < 0.0)
 
     @lazy
     def signs(self) -> tuple[bool, bool, bool]:
@@ -268,19 +265,18 @@ class Sample:
                 beside.append(_turn(point_ahead(here, way, _CLOSELY)))
         return len(beside) > 1 and min(beside[1:]) <= _LEVEL
 
-    def measures(self, completed: bool) -> Array:
+    @lazy
+    def measures(self) -> Array:
         """turn, fold, double, torus of `bifurcation.measures`: signs and logarithms of their moduli, shape (2, 4).
 
         Where the parameter stands still those of the multipliers but the one at +1.
         """
-        if completed not in self._measures:
-            point, known = self.point, self.told(completed)
-            tests = measures.measured(point.tangent, point.weights, point.curve.parameter, known)
-            if self.still:
-                tests[:, 0] = 1.0, math.log(_LEVEL)
-                tests[:, 1:] = symmetric_functions(_without(known.multipliers, 1.0 + 0.0j, several=False))
-            self._measures[completed] = tests
-        return self._measures[completed]
+        point, known = self.point, self.floquet
+        tests = measures.measured(point.tangent, point.weights, point.curve.parameter, known)
+        if self.still:
+            tests[:, 0] = 1.0, math.log(_LEVEL)
+            tests[:, 1:] = symmetric_functions(_without(known.multipliers, 1.0 + 0.0j, several=False))
+        return tests
 
     @lazy
     def grip(self) -> Grip:
@@ -526,20 +522,17 @@ class Comparison(NamedTuple):
 
     first
         The first of the two.
-    completed
-        Whether multipliers of completed motions are compared.
     change
         How many more are outside the unit circle at the second.
     """
 
     first: weakref.ref[Sample]
-    completed: bool
     change: int
 
 
-def completed(*samples: Sample) -> bool:
-    """Whether tests compare multipliers of completed motions: where all are resolved. Elsewhere what completes motions
-    is as large as what it completes, and jumps from one to the next; those of motions as they stand are smooth.
+def resolved(*samples: Sample) -> bool:
+    """Whether multipliers tell what happens between samples: where those of all are resolved. Elsewhere what completes
+    motions is as large as what it completes, and jumps from one to the next.
     """
     for sample in samples:  # noqa: SIM110 - `all` takes three times as long
         if not sample.resolved:
@@ -551,12 +544,6 @@ def compare(a: Sample, b: Sample) -> Comparison:
     """The comparison of two neighbours, which several ask for."""
     known = b.comparison
     if known is None or known.first() is not a:
-        which = completed(a, b)
-        b.comparison = known = Comparison(weakref.ref(a), which, b.outside(which) - a.outside(which))
+        change = b.outside - a.outside if resolved(a, b) else b.beyond - a.beyond
+        b.comparison = known = Comparison(weakref.ref(a), change)
     return known
-
-
-def multipliers_of(*samples: Sample) -> list[ComplexArray]:
-    """Multipliers of neighbours, as tests compare them."""
-    which = completed(*samples)
-    return [sample.told(which).multipliers for sample in samples]

@@ -20,7 +20,7 @@ from suboctave.bifurcation.measures import in_doubt
 from suboctave.continuation.ending import Ending
 from suboctave.continuation.linear import Factor
 from suboctave.continuation.notes import Note
-from suboctave.curves.trace import BranchPoint, Trace, Unsettled, joined
+from suboctave.curves.trace import UNRESOLVED, BranchPoint, Trace, Unsettled, joined
 from suboctave.floquet.methods import StabilityMethod
 from suboctave.floquet.result import NO_VERDICT, FloquetResult, written
 from suboctave.harmonic.evaluation import BalanceState
@@ -31,7 +31,6 @@ from suboctave.kinds import KINDS
 
 #: distance, in scaled arclength and of multipliers, up to which bifurcations fall together
 _AT_ONCE = 1e-5
-_UNRESOLVED = "stability is open: multipliers are not resolved with these harmonics"
 #: motions in a row that witnesses could not settle, after which they are not asked until a verdict is clear again
 _PATIENCE = 3
 
@@ -214,7 +213,7 @@ def _stretches(points: Sequence[BranchPoint], open_ones: list[int], name: str) -
             notes.append(Note(text, name, _value(a, name), _value(b, name)))
             continue
         if any(points[i].floquet.vague for i in range(first, last + 1)):
-            stretches.append(_stretch(a, b, name, _UNRESOLVED))
+            stretches.append(_stretch(a, b, name, UNRESOLVED))
             continue
         worst = f"{_worst(result)} by {result.method}"
         reason = f"stability is open: a multiplier ({worst}) lies within its error of the unit circle"

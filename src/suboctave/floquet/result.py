@@ -18,7 +18,7 @@ from suboctave.lazy import lazy
 
 #: error of a multiplier, or share of one outside the circle, up to which it is resolved; modulus, with its error, from
 #: which on it may decide
-RESOLVED, _DECIDING = 0.2, 0.5
+RESOLVED, _DECIDING = 0.3, 0.5
 #: error of a multiplier above which it is known to no side of the circle, and the same as a share of one outside: an
 #: estimate of first order means nothing where it is as large as what it belongs to
 NO_VERDICT, _SHARE = 1.0, 0.5

@@ -38,7 +38,7 @@ from suboctave.continuation.point import CurvePoint, between, point_between
 from suboctave.continuation.problem import Array
 from suboctave.curves.events.formulation import BORDERED, Formulation
 from suboctave.curves.events.locate import Guess, Singular, locate_branch_point, locate_multiple
-from suboctave.curves.sample import Sample, compare, multipliers_of
+from suboctave.curves.sample import Sample, compare, resolved
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.basis import ComplexArray
 from suboctave.harmonic.perturbation import Kind
@@ -174,11 +174,13 @@ class NeimarkSacker(BifurcationKind):
     @staticmethod
     def crossing(a: Sample, b: Sample) -> tuple[complex, complex] | None:
         """The complex pair of multipliers that crosses the circle: its members at a and b."""
+        if not resolved(a, b):
+            return None
         kinds = _passing_one(a, b)
         real = sum(kind.multiplicity for kind in kinds)
         # one multiplier passes +1 at a limit point or a branch point, or at both in one
         real -= BRANCH_POINT in kinds and LIMIT_POINT in kinds
-        before, behind = multipliers_of(a, b)
+        before, behind = a.floquet.multipliers, b.floquet.multipliers
         return crossing_pair(before, behind, compare(a, b).change, real)
 
     @staticmethod
@@ -191,7 +193,7 @@ class NeimarkSacker(BifurcationKind):
 
     def kappa(self, sample: Sample) -> float:
         """From the complex multiplier closest to the unit circle: `mu = exp(i kappa T)`."""
-        pairs = upper(*multipliers_of(sample))
+        pairs = upper(sample.floquet.multipliers)
         if not len(pairs):
             raise ConvergenceError("no complex pair of multipliers here")
         mu = min(pairs, key=lambda m: abs(abs(m) - 1.0))
@@ -219,7 +221,7 @@ class PairAmong(NeimarkSacker):
         self.rank, self.count = rank, count
 
     def _pair(self, sample: Sample) -> complex:
-        pairs = upper(*multipliers_of(sample))
+        pairs = upper(sample.floquet.multipliers)
         nearest = pairs[np.argsort(np.abs(np.abs(pairs) - 1.0), kind="stable")[: self.count]]
         if len(nearest) < self.count:
             raise ConvergenceError("no complex pair of multipliers here")
@@ -317,7 +319,7 @@ def _pairs_within(a: Sample, b: Sample) -> int:
     """How many pairs cross the circle within the shortest interval, 0 in longer ones, which are cut."""
     if b.place - a.place > _SHORTEST:
         return 0
-    outside = [int(np.count_nonzero(np.abs(upper(mu)) > 1.0)) for mu in multipliers_of(a, b)]
+    outside = [int(np.count_nonzero(np.abs(upper(s.floquet.multipliers)) > 1.0)) for s in (a, b)]
     return abs(outside[1] - outside[0])
 
 
@@ -325,7 +327,9 @@ def _together(kind: BifurcationKind, a: Sample, b: Sample) -> tuple[Array, Array
     """By how much the multipliers that pass the circle together between two neighbours, two of them at least, lie
     outside of it at both; they must be alike before and behind. Empty where there are none.
     """
-    sorts = [kind.of_its_sort(mu) for mu in multipliers_of(a, b)]
+    if not resolved(a, b):
+        return _NONE, _NONE
+    sorts = [kind.of_its_sort(sample.floquet.multipliers) for sample in (a, b)]
     outside = [mu[np.abs(mu) > 1.0] for mu in sorts]
     several = abs(len(outside[0]) - len(outside[1]))
     if several < 2:
@@ -361,7 +365,7 @@ def _real(mu: ComplexArray) -> ComplexArray:
 
 def _nearest(sample: Sample, target: float) -> float:
     """Distance of the real multiplier nearest to a target from it, signed; nan if there is none."""
-    real = _real(*multipliers_of(sample)).real
+    real = _real(sample.standing.multipliers).real
     return float(real[np.argmin(np.abs(real - target))] - target) if real.size else float("nan")
 
 
