@@ -196,10 +196,7 @@ class _Follower(Driver):
         """True if a step stays on its curve and its interior could be looked at, or ends where it meets another."""
         self._meeting = None
         if passes_doubling(b):
-            met = self._met(a, b)
-            if met is None or met.arrival.point is None:
-                return met is not None
-            b = met.arrival.point
+            return self._met(a, b) is not None
         a, b = self._plain(a), self._plain(b)
         assert isinstance(a.evaluation, MotionEvaluation)
         assert isinstance(b.curve, MotionProblem)
@@ -357,7 +354,7 @@ class _Follower(Driver):
     def _look_behind(self, inside: list[Sample]) -> None:
         """What the harmonics solved for do not show of a step: hidden pairs, and open verdicts between its points."""
         known = [sample for sample in inside if sample.completed_is_known]
-        for stretch in self._hidden.passed(known):
+        for stretch in self._hidden.passed([sample for sample in known if sample.resolved]):
             pairs = [] if self._watch else pair_in(stretch, self.settings.newton)
             items = [item for entry in pairs if (item := self._bifurcation(*entry)) is not None]
             for item in items:

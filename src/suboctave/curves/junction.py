@@ -218,6 +218,9 @@ def meeting(a: CurvePoint, b: CurvePoint, newton: NewtonOptions) -> Meeting | No
     try:
         landed = _landed(a, b, newton)
         doubling, several = _doubling_at(landed)
+        if several == 1 and landed.orientation != a.orientation:
+            # that of another branch, onto which the step has jumped
+            return None
         while several == 1 and (finer := _finer(landed, doubling)) is not None:
             landed = _landed_with(finer, landed, newton)
             doubling, several = _doubling_at(landed)

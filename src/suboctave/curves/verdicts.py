@@ -212,7 +212,7 @@ def _stretches(points: Sequence[BranchPoint], open_ones: list[int], name: str) -
             text = "the motion is undamped: its multipliers stay on the unit circle, stability is open. Add damping"
             notes.append(Note(text, name, _value(a, name), _value(b, name)))
             continue
-        if any(points[i].floquet.vague for i in range(first, last + 1)):
+        if not all(points[i].floquet.resolved for i in range(first, last + 1)):
             stretches.append(_stretch(a, b, name, UNRESOLVED))
             continue
         worst = f"{_worst(result)} by {result.method}"
