@@ -30,7 +30,7 @@ from suboctave.continuation.problem import Array
 from suboctave.curves.events.monitors import BRANCH_POINT, BifurcationKind, Located, NeimarkSacker, changes
 from suboctave.curves.interior import FINEST, Interior, Steps, unsettled
 from suboctave.curves.sample import Sample, compare, resolved
-from suboctave.curves.trace import UNRESOLVED, Audit
+from suboctave.curves.trace import Audit
 from suboctave.floquet.held import of_those_moved
 from suboctave.floquet.result import FloquetResult
 from suboctave.floquet.symmetric import in_rings, symmetric_functions
@@ -199,8 +199,6 @@ class GuardedStep(Interior):
         doubt = super().doubt(p, q)
         if doubt is None and told and h > _EXAMINED and _too_fast(p, q, eventful):
             return 0.5, "multipliers move too fast to be followed"
-        if doubt is None and not told:
-            self.unsettled.append(unsettled(p, q, UNRESOLVED))
         # right beside a branch point at which the curve turns the multiplier at +1 is known up to its error only
         return None if doubt is not None and doubt[1] == _RETURNS and h <= _EXAMINED and self.turned else doubt
 

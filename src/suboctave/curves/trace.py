@@ -142,12 +142,6 @@ class Unsettled:
         return f"between {self.parameter} = {self.first:.9g} and {self.last:.9g} {self.reason}"
 
 
-#: what is said of motions whose multipliers have errors too large to tell what they do
-UNRESOLVED = (
-    "multipliers are not resolved with these harmonics: stability is open, and Neimark-Sacker points are not looked for"
-)
-
-
 def joined(stretches: Iterable[Unsettled]) -> list[Unsettled]:
     """Stretches in the order of the branch, those at one place as one: what overlaps, or lies no farther apart than
     PLACE or than the longer of two is long.

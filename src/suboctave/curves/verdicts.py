@@ -20,9 +20,9 @@ from suboctave.bifurcation.measures import in_doubt
 from suboctave.continuation.ending import Ending
 from suboctave.continuation.linear import Factor
 from suboctave.continuation.notes import Note
-from suboctave.curves.trace import UNRESOLVED, BranchPoint, Trace, Unsettled, joined
+from suboctave.curves.trace import BranchPoint, Trace, Unsettled, joined
 from suboctave.floquet.methods import StabilityMethod
-from suboctave.floquet.result import NO_VERDICT, FloquetResult, written
+from suboctave.floquet.result import FloquetResult, written
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.truncation import MOST_HARMONICS
@@ -31,6 +31,9 @@ from suboctave.kinds import KINDS
 
 #: distance, in scaled arclength and of multipliers, up to which bifurcations fall together
 _AT_ONCE = 1e-5
+_UNRESOLVED = (
+    "multipliers are not resolved with these harmonics: stability is open, and Neimark-Sacker points are not looked for"
+)
 #: motions in a row that witnesses could not settle, after which they are not asked until a verdict is clear again
 _PATIENCE = 3
 
@@ -48,7 +51,7 @@ def with_verdicts(trace: Trace, method: StabilityMethod, name: str) -> Trace:
     events = [_at_event(item, asking) for item in trace.events]
     if asking.interruption is not None:
         trace.ends(Ending.stopped(asking.interruption, "its end, before open verdicts on stability were settled"))
-    in_doubt = [i for i, p in enumerate(points) if not (p.floquet.decided or p.still)]
+    in_doubt = [i for i, p in enumerate(points) if not ((p.floquet.decided and p.floquet.resolved) or p.still)]
     # a branch that leaves or meets another does so with a multiplier at +1
     ends = [replace(item, kind="BP") for item in (trace.departs, trace.arrives) if item is not None]
     known = [*bifurcations, *ends]
@@ -110,8 +113,8 @@ def _settled(points: Sequence[BranchPoint], asking: _Asking, beside: set[int]) -
         result = point.floquet
         if result.decided:
             in_vain = 0
-        elif "harmonics" in result.checks or not np.isfinite(result.errors).any():
-            # more harmonics have been asked already
+        elif "harmonics" in result.checks or not result.resolved:
+            # more harmonics have been asked already, or would be needed
             pass
         elif number not in beside and not point.still and in_vain < _PATIENCE:
             result = asking.answer(point.orbit.state(), result)
@@ -188,7 +191,7 @@ def _explained(result: FloquetResult, reach: tuple[float, float], bifurcations: 
     within = result.open
     mu, errors = result.multipliers[within], result.errors[within]
     explained = np.zeros(len(mu), dtype=bool)
-    if (errors > NO_VERDICT).any():
+    if not result.resolved:
         # what may be anywhere is no evidence of a bifurcation
         return False
     if near & {"LP", "BP"}:
@@ -213,7 +216,7 @@ def _stretches(points: Sequence[BranchPoint], open_ones: list[int], name: str) -
             notes.append(Note(text, name, _value(a, name), _value(b, name)))
             continue
         if not all(points[i].floquet.resolved for i in range(first, last + 1)):
-            stretches.append(_stretch(a, b, name, UNRESOLVED))
+            stretches.append(_stretch(a, b, name, _UNRESOLVED))
             continue
         worst = f"{_worst(result)} by {result.method}"
         reason = f"stability is open: a multiplier ({worst}) lies within its error of the unit circle"
