@@ -12,6 +12,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from operator import attrgetter
 
 import numpy as np
 
@@ -219,7 +220,7 @@ class March:
         point = self.start
         if point.tangent[point.curve.parameter] * self.direction < 0.0:
             point = point.turned
-        ranges = (Bounds(*self.bounds, lambda curve: curve.parameter), *self.others)
+        ranges = (Bounds(*self.bounds, attrgetter("parameter")), *self.others)
         home = Place(self.home or point)
         mark, marked = home, 0
         yield point

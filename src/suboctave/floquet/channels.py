@@ -93,7 +93,7 @@ class Channels:
                 self._laws += [(law, g, np.ones(1)) for law in own]
         for channel in state.own_channels if state.balance.own else ():
             self._add(channel)
-        if any(law.harmonic for law, _, _ in self._laws):
+        if self._laws and any(law.harmonic for law, _, _ in self._laws):
             turning = np.zeros(state.basis.harmonics + 1, dtype=complex)
             turning[1] = 1.0
             self._clock = self._channel(turning)

@@ -164,7 +164,7 @@ class StructuralMatrices(EquationOfMotion):
     def stiffness(self, frequency: NDArray[Any], order: int = 0) -> ComplexArray:
         """See `LinearPart.stiffness`."""
         out: ComplexArray = np.empty((frequency.size, self.size * self.size), dtype=complex)
-        dynamic_stiffness(self._entries, frequency.astype(complex), order, out)
+        dynamic_stiffness(self._entries, frequency, order, out)
         return out.reshape(-1, self.size, self.size)
 
     @lazy
@@ -300,7 +300,7 @@ def _blocks(matrices: Array, frequency: NDArray[Any], order: int) -> ComplexArra
 def entries_at(entries: Array, frequency: NDArray[Any], order: int) -> ComplexArray:
     """The same from all entries of M, C, K, S in rows, (4, .); (F, .)."""
     out = np.empty((len(frequency), entries.shape[1]), dtype=complex)
-    dynamic_stiffness(entries, frequency.astype(complex), order, out)
+    dynamic_stiffness(entries, frequency, order, out)
     return out
 
 
@@ -315,9 +315,9 @@ def factors(w, order):
 @kernel()
 def dynamic_stiffness(entries, frequency, order, out):
     """`K - Omega^2 M + i Omega C + i sgn(Re Omega) S` into `out` (F, .), or its first or second derivative by Omega,
-    complex; entries (4, .): M, C, K, S.
+    complex or real; entries (4, .): M, C, K, S.
     """
     for f in range(frequency.shape[0]):
-        by = factors(frequency[f], order)
+        by = factors(complex(frequency[f]), order)
         for i in range(entries.shape[1]):
             out[f, i] = by[0] * entries[0, i] + by[1] * entries[1, i] + by[2] * entries[2, i] + by[3] * entries[3, i]

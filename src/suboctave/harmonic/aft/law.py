@@ -29,6 +29,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from suboctave.harmonic.basis import Array, ComplexArray
+from suboctave.lazy import lazy
 from suboctave.model.elements.base import BaseElement
 from suboctave.model.elements.smoothness import Sampling
 
@@ -78,7 +79,7 @@ class Along:
         """Highest harmonic H."""
         return self.motions.shape[1] - 1
 
-    @property
+    @lazy
     def size(self) -> int:
         """Number Q of entries of q."""
         return 2 * len(self.motions) if self.moving else len(self.motions)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from itertools import pairwise, zip_longest
 from typing import NamedTuple
 
@@ -21,6 +22,8 @@ from suboctave.model.elements.smoothness import (
 )
 
 __all__ = ["PackedLaws", "Probe"]
+
+_NO_TERMS = np.zeros(0)
 
 
 class Probe(NamedTuple):
@@ -41,6 +44,16 @@ class Weights(NamedTuple):
     second: Array
     third: Array
     slope: Array | None = None
+
+
+class _Fixed(NamedTuple):
+    """What of `ClosedLaws` is the same whatever numbers are in the laws."""
+
+    owner: np.ndarray
+    starts: np.ndarray
+    nodes: Array
+    grid: Array
+    rules: tuple[Array, Array]
 
 
 class PackedLaws:
@@ -114,7 +127,7 @@ class PackedLaws:
         self.steps = np.array(steps) if steps else NO_ROWS
         self.first, self.step_first = np.array(first), np.array(step_first)
         #: the direction of every piece, (P,), and of every step, (S,)
-        self.owner, self.step_owner = _owners(first), _owners(step_first)
+        self.owner, self.step_owner = _owners(tuple(first)), _owners(tuple(step_first))
         self.polynomial = np.zeros((len(self.line), max(map(len, polynomials), default=0)))
         for row, polynomial in zip(self.polynomial, polynomials, strict=False):
             row[: len(polynomial)] = polynomial
@@ -142,23 +155,15 @@ class PackedLaws:
         return known
 
     def _closed_laws(self, high: int, top: int) -> ClosedLaws:
-        smooth, grid = self._smooth, search_grid(high)
-        sets = [np.zeros((3, 0))] * len(smooth)
-        for s, (_, polynomial, _, sharp) in enumerate(smooth):
-            if sharp is None:
-                at = polynomial_nodes((len(polynomial) - 1) * high, top)
-                sets[s] = np.array((at.zr, at.zi, at.weights))
-        sizes = [[len(one[1]) for one in smooth], [len(one[2]) for one in smooth], [one.shape[1] for one in sets]]
+        smooth = self._smooth
+        fixed = _fixed(tuple([(g, len(polynomial), len(steps)) for g, polynomial, steps, _ in smooth]), high, top)
         return ClosedLaws(
             self.pieces,
             self.first,
-            np.array([one[0] for one in smooth], dtype=np.int64),
-            np.concatenate([np.zeros(0), *(one[1] for one in smooth)]),
-            np.concatenate([NO_ROWS, *(one[2] for one in smooth)]),
-            np.cumsum([[0, *row] for row in sizes], axis=1),
-            np.concatenate([np.zeros((3, 0)), *sets], axis=1),
-            np.array((grid.zr, grid.zi)),
-            rule_tables(),
+            fixed.owner,
+            np.concatenate([_NO_TERMS, *[one[1] for one in smooth]]),
+            np.concatenate([NO_ROWS, *[one[2] for one in smooth]]),
+            *fixed[1:],
         )
 
     def weights(self, direction: int, motion: ComplexArray, nodes: list[Nodes]) -> list[Weights]:
@@ -186,6 +191,25 @@ def _nodes(motion: ComplexArray, polynomial: Array, sharp: tuple[Array, Array] |
     return graded_nodes(motion, *sharp, top)
 
 
-def _owners(first: list[int]) -> NDArray[np.int64]:
+@lru_cache(maxsize=64)
+def _owners(first: tuple[int, ...]) -> NDArray[np.int64]:
     """The direction of every row, from where each direction's begin."""
     return np.array([g for g, (low, high) in enumerate(pairwise(first)) for _ in range(low, high)], dtype=np.int64)
+
+
+@lru_cache(maxsize=64)
+def _fixed(smooth: tuple[tuple[int, int, int], ...], high: int, top: int) -> _Fixed:
+    """Of smooth laws by direction, terms of a polynomial, and number of steps: a polynomial where there is none."""
+    grid, sets = search_grid(high), [np.zeros((3, 0))] * len(smooth)
+    for s, (_, terms, steps) in enumerate(smooth):
+        if not steps:
+            at = polynomial_nodes((terms - 1) * high, top)
+            sets[s] = np.array((at.zr, at.zi, at.weights))
+    sizes = [[one[1] for one in smooth], [one[2] for one in smooth], [one.shape[1] for one in sets]]
+    return _Fixed(
+        np.array([one[0] for one in smooth], dtype=np.int64),
+        np.cumsum([[0, *row] for row in sizes], axis=1),
+        np.concatenate([np.zeros((3, 0)), *sets], axis=1),
+        np.array((grid.zr, grid.zi)),
+        rule_tables(),
+    )
