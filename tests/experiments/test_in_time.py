@@ -229,3 +229,9 @@ def test_pictures_show_every_period(oscillator, tmp_path):
     so.integrate(oscillator, omega=2.0, periods=2).plot(tmp_path / "time.svg")
     so.poincare_sections(oscillator, start=GRID[:3], omega=2.0, transient=10, periods=6).plot(tmp_path / "points.pdf")
     assert {p.name for p in tmp_path.iterdir()} == {"over.png", "time.svg", "points.pdf"}
+
+
+def test_columns_of_states_have_the_names_of_degrees_of_freedom():
+    equations = ["a'' + 0.1*a' + a + a**3 = cos(omega*t)", "b'' + 0.1*b' + 2*b - a = 0"]
+    frame = so.integrate(so.System.from_equations(equations), 1.2, periods=3).to_dataframe()
+    assert list(frame.columns) == ["time", "x_a", "x_b", "v_a", "v_b"]

@@ -170,7 +170,8 @@ def coordinates(system: System) -> list[str]:
 def watched_states(system: System, projection: ProjectedSystem | None) -> tuple[list[int], list[str]]:
     """Which entries of a state a table has, and their names: all, of a projected structure those that are watched."""
     dofs = list(range(system.n)) if projection is None else list(projection.watched)
-    return [*dofs, *(system.n + dof for dof in dofs)], [f"{kind}_{i}" for kind in "xv" for i in dofs]
+    named = [system.dof_names[i] if system.dof_names else str(i) for i in dofs]
+    return [*dofs, *(system.n + dof for dof in dofs)], [f"{kind}_{name}" for kind in "xv" for name in named]
 
 
 # -------------------------------------------------------------------------------------------------- large structures
