@@ -60,9 +60,10 @@ def distance(u, v, weights):
     return math.sqrt(np.dot(way, way))
 
 
-@kernel()
+# numbers out of range are an exception, not an angle
+@kernel(error_model="python")
 def cosine(a, b, weights):
-    """Cosine of the angle between two vectors in scaled variables."""
+    """Cosine of the angle between two vectors in scaled variables; ZeroDivisionError where one has no length."""
     one, other = np.empty(len(a)), np.empty(len(a))
     for i in range(len(a)):
         one[i], other[i] = weights[i] * a[i], weights[i] * b[i]
