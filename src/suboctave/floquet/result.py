@@ -16,9 +16,9 @@ from suboctave.floquet.symmetric import UNDAMPED, distinct, symmetric_functions
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.lazy import lazy
 
-#: error of a multiplier, or share of one outside the circle, up to which it is resolved; modulus, with its error, from
-#: which on it may decide
-RESOLVED, _DECIDING = 0.3, 0.5
+#: error of a multiplier, or share of one outside the circle, that is aimed at where more harmonics are asked, and up to
+#: which tests compare it; modulus, with its error, from which on it may decide
+AIM, RESOLVED, _DECIDING = 0.2, 0.3, 0.5
 #: error of a multiplier above which it is known to no side of the circle, and the same as a share of one outside: an
 #: estimate of first order means nothing where it is as large as what it belongs to
 NO_VERDICT, _SHARE = 1.0, 0.5
@@ -39,8 +39,7 @@ def _known_within(mu, error):
 @kernel()
 def _off_the_circle(mu, errors):
     """Largest modulus minus one, whether all are off the circle by more than their errors, how many are outside, the
-    distance of the nearest one, and the largest error of one that may decide, in units of that up to which it is
-    resolved.
+    distance of the nearest one, and the largest error of one that may decide, in units of that aimed at.
     """
     largest, decided, outside, nearest, vagueness = -np.inf, True, 0, np.inf, 0.0
     for i in range(mu.shape[0]):
@@ -51,7 +50,7 @@ def _off_the_circle(mu, errors):
         outside += beyond > 0.0
         nearest = min(nearest, abs(beyond))
         if not beyond + errors[i] <= _DECIDING - 1.0:
-            vagueness = max(vagueness, errors[i] / (RESOLVED * max(1.0, beyond + 1.0)))
+            vagueness = max(vagueness, errors[i] / (AIM * max(1.0, beyond + 1.0)))
     return largest, decided, outside, nearest, vagueness
 
 
@@ -165,11 +164,11 @@ class FloquetResult:
         """Whether the multipliers that may decide are known to a share of themselves: the error of a multiplier of the
         corrected motion goes with the square of the shift that is stated.
         """
-        return self.vagueness <= 1.0
+        return self.vagueness * AIM <= RESOLVED
 
     @property
     def vagueness(self) -> float:
-        """Largest error of a multiplier that may decide, in units of that up to which it is resolved."""
+        """Largest error of a multiplier that may decide, in units of that aimed at."""
         return self._verdict[4]
 
     @property
