@@ -51,7 +51,7 @@ def with_verdicts(trace: Trace, method: StabilityMethod, name: str) -> Trace:
     events = [_at_event(item, asking) for item in trace.events]
     if asking.interruption is not None:
         trace.ends(Ending.stopped(asking.interruption, "its end, before open verdicts on stability were settled"))
-    in_doubt = [i for i, p in enumerate(points) if not ((p.floquet.decided and p.floquet.resolved) or p.still)]
+    in_doubt = [i for i, p in enumerate(points) if not (p.floquet.decided or p.still)]
     # a branch that leaves or meets another does so with a multiplier at +1
     ends = [replace(item, kind="BP") for item in (trace.departs, trace.arrives) if item is not None]
     known = [*bifurcations, *ends]

@@ -161,10 +161,10 @@ class FloquetResult:
 
     @property
     def resolved(self) -> bool:
-        """Whether the multipliers that may decide are known to a share of themselves: the error of a multiplier of the
-        corrected motion goes with the square of the shift that is stated.
+        """Whether the verdict is clear, or the multipliers that may decide are known to a share of themselves: the
+        error of a multiplier of the corrected motion goes with the square of the shift that is stated.
         """
-        return self.vagueness * AIM <= RESOLVED
+        return self.decided or self.vagueness * AIM <= RESOLVED
 
     @property
     def vagueness(self) -> float:
