@@ -137,7 +137,7 @@ class Sample:
 
     @lazy
     def resolved(self) -> bool:
-        """Whether the multipliers of the completed motion that may decide are known to a share of themselves."""
+        """Whether the multipliers of the completed motion tell on which side of the circle they lie, or how near."""
         return self.floquet.resolved
 
     #: the motion with more harmonics that the multipliers are those of, None where they are the curve's own

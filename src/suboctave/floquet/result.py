@@ -18,7 +18,7 @@ from suboctave.lazy import lazy
 
 #: error of a multiplier, or share of one outside the circle, that is aimed at where more harmonics are asked, and up to
 #: which tests compare it; modulus, with its error, from which on it may decide
-AIM, RESOLVED, _DECIDING = 0.2, 0.3, 0.5
+_AIMED_AT, RESOLVED, _DECIDING = 0.2, 0.3, 0.5
 #: error of a multiplier above which it is known to no side of the circle, and the same as a share of one outside: an
 #: estimate of first order means nothing where it is as large as what it belongs to
 NO_VERDICT, _SHARE = 1.0, 0.5
@@ -50,7 +50,7 @@ def _off_the_circle(mu, errors):
         outside += beyond > 0.0
         nearest = min(nearest, abs(beyond))
         if not beyond + errors[i] <= _DECIDING - 1.0:
-            vagueness = max(vagueness, errors[i] / (AIM * max(1.0, beyond + 1.0)))
+            vagueness = max(vagueness, errors[i] / (_AIMED_AT * max(1.0, beyond + 1.0)))
     return largest, decided, outside, nearest, vagueness
 
 
@@ -164,7 +164,7 @@ class FloquetResult:
         """Whether the verdict is clear, or the multipliers that may decide are known to a share of themselves: the
         error of a multiplier of the corrected motion goes with the square of the shift that is stated.
         """
-        return self.decided or self.vagueness * AIM <= RESOLVED
+        return self.decided or self.vagueness * _AIMED_AT <= RESOLVED
 
     @property
     def vagueness(self) -> float:

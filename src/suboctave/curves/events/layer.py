@@ -58,7 +58,7 @@ _REACH = 0.01
 #: the same for one that is bracketed only
 _BRACKETED = 1e-3
 #: how many times as far as a grazing lies the first correction of Newton's method to it may lead
-_FORETOLD = 4.0
+_STEP_TO_GRAZING = 4.0
 #: way behind a grazing at which a test function is first looked at, and secants in its root
 _FIRST, _SECANTS = 1e-8, 3
 #: change of kappa, in units of the base frequency, that tells how det J_kappa depends on it
@@ -264,7 +264,7 @@ def _side(kind: str, floquet: FloquetResult) -> bool:
 
 def _beside(guess: Guess, limit: float) -> list[tuple[Touch, Grazing, float]]:
     """Grazings up to some way off, the nearest first."""
-    foretold = _foretold(guess, _touches_near(guess, young=False), _FORETOLD * limit)
+    foretold = _foretold(guess, _touches_near(guess, young=False), _STEP_TO_GRAZING * limit)
     near = [item for item in _solved(guess, foretold) if item[2] <= limit]
     return sorted(near, key=lambda item: item[2])
 
@@ -279,7 +279,7 @@ def _foretold(guess: Guess, touches: list[Touch], limit: float) -> list[Touch]:
     state, weights = guess.state, _weights(guess.state, guess)
     rises = [_rise(state, touch, guess.name) for touch in touches]
     row = rises[0][1] / weights
-    factor, rows = _bordered(state, guess, weights, row)
+    factor, rows = _above(state, guess, weights, row)
     if factor.singular:
         return touches
     size = len(row)
@@ -344,7 +344,7 @@ def _way_behind(touch: Touch, grazing: Grazing, guess: Guess) -> Array | None:
     state = grazing.state
     weights = _weights(state, guess)
     rise = touch.rise(grazing, guess.name) / weights
-    factor, _ = _bordered(state, guess, weights, rise)
+    factor, _ = _above(state, guess, weights, rise)
     if factor.singular:
         return None
     # along it the extremum rises through the gap at a rate of one: an excursion is a maximum above, a minimum below
@@ -353,7 +353,7 @@ def _way_behind(touch: Touch, grazing: Grazing, guess: Guess) -> Array | None:
     return np.asarray(tangent / weights)
 
 
-def _bordered(state: BalanceState, guess: Guess, weights: Array, row: Array) -> tuple[Factor, Array]:
+def _above(state: BalanceState, guess: Guess, weights: Array, row: Array) -> tuple[Factor, Array]:
     """The equations' derivatives above a row, both scaled, factorised; the weights of the equations."""
     dimension = state.balance.dimension
     rows = state.balance.row_weights(dimension) / max(state.balanced.scale, np.finfo(float).tiny)
