@@ -46,8 +46,6 @@ MOST_PROBES = 60
 _AWAY = 0.03
 #: samples on either side of an interval that tell what its inside may be
 _BESIDE = 3
-#: pairs of samples whose contacts are remembered, at least
-_REMEMBERED = 64
 #: intervals shorter than this are not cut because a contact grazes in them
 _LAYER = 1e-3
 #: share to which an excursion across a gap may shrink in an interval
@@ -113,9 +111,8 @@ class Steps:
     def keep(self, samples: list[Sample]) -> None:
         """The last of these lie behind the next step."""
         self._behind = samples[-self.reach :]
-        if len(self._contacts) > _REMEMBERED:
-            kept = set(self._behind)
-            self._contacts = {pair: known for pair, known in self._contacts.items() if kept.issuperset(pair)}
+        kept = set(self._behind)
+        self._contacts = {(p, q): known for (p, q), known in self._contacts.items() if p in kept and q in kept}
 
     def forget(self) -> None:
         """What lies behind says nothing of what comes (a corner of the equations)."""

@@ -108,7 +108,7 @@ class Forms(NamedTuple):
     turning: np.ndarray
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=4)
 def forms_along(level: Level, sequence: tuple[tuple[float, ...], ...]) -> tuple[Forms, float]:
     """The forms of a sequence of stiffnesses (G,), and the largest of their relative errors by rounding; where there is
     none for a stiffness, that of the free structure.

@@ -141,8 +141,6 @@ class Search:
 
     def _consider(self, loop: Loop) -> None:
         """A branch that is detached exists over some range, unless it is known; any other is known from now on."""
-        if any(self.isola_on(piece, loop.value) for piece in loop.pieces):
-            return
         if not (loop.detached and loop.pieces):
             self.attach(loop)
             return
@@ -194,7 +192,9 @@ class Search:
                 beyond, _ = next(self.critical(piece.nu, value, not upper), (bounds[0 if upper else 1], []))
                 # the curve may have been followed less far
                 reach = max(beyond, piece.low) if upper else min(beyond, piece.high)
-                yield piece, 0.5 * (value + reach)
+                start = 0.5 * (value + reach)
+                if self.isola_on(piece, start) is None:
+                    yield piece, start
 
     # ------------------------------------------------------------------------------------------------- what is said
     def result(self) -> Isolas:

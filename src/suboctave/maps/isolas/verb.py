@@ -83,7 +83,7 @@ def find_isolas(
         among the nonlinear resonances of the linear modes as well (`find_subharmonics`). Default: 2 where no isola was
         found otherwise, at three of the values; () for never.
     seeds
-        How finely that is done.
+        How finely that is done; default as of `find_subharmonics`.
     max_curves
         Curves of bifurcations after which no more are followed.
 
@@ -204,16 +204,12 @@ def _from_load_levels(search: Search, levels: Sequence[float] | None, depth: int
         stage.done += 1
 
 
-#: how finely periods are looked for: half as many frequencies as by default, at twice as many values
-_SEEDS = Seeds(20, 3, 3)
-
-
 def _from_resonances(search: Search, chosen: bool, seeds: Seeds | None, stages: Mapping[int, Stage]) -> None:
     """Motions of some periods near nonlinear resonances of the linear modes (`find_subharmonics`).
 
     Periods that nobody has `chosen` are looked for where no isola is known, at few values.
     """
-    fine = seeds or (_SEEDS if chosen else Seeds())
+    fine = seeds or Seeds()
     for value in search.closer if chosen else search.few:
         for order, stage in stages.items():
             if not chosen and search.isolas:
