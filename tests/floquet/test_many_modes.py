@@ -182,3 +182,32 @@ def test_modes_that_no_channel_sees():
             at = np.abs(result.multipliers - np.exp(root * 2.0 * np.pi / 1.1)).argmin()
             assert abs(result.multipliers[at] - np.exp(root * 2.0 * np.pi / 1.1)) < 1e-13
             assert result.errors[at] < 1e-12
+
+
+def test_many_forces_that_vary():
+    """Cubic springs at every mass of a chain, whose forces make systems of many equations on every panel: against a
+    general-purpose integrator.
+    """
+    n, stiffness = 6, 2.0 * np.eye(6) - np.eye(6, k=1) - np.eye(6, k=-1)
+    springs = [so.PolynomialSpring(i, coefficients={3: 0.5 + 0.2 * i}) for i in range(n)]
+    dampers = [so.QuadraticDamper(i, 0.05) for i in range(1, n, 2)]
+    damping = 0.02 * (stiffness + np.eye(n))
+    system = so.System(np.eye(n), damping, stiffness, elements=springs + dampers, loads=[so.HarmonicLoad(n - 1, 1.0)])
+    state = so.frequency_response(system, (0.6, 0.61), harmonics=9).orbits[-1].state()
+    _, mu, errors = before(state)
+    coefficients, rates = np.array([0.5 + 0.2 * i for i in range(n)]), np.array([0.0, 0.05] * 3)
+
+    def field(t, y):
+        u, v = y.reshape(2, n, 2 * n)
+        k = np.arange(1, len(state.x) // 2 + 1) * state.rate
+        cos, sin = np.cos(k * t), np.sin(k * t)
+        q = state.x[0] + cos @ state.x[1::2] + sin @ state.x[2::2]
+        speed = (k * cos) @ state.x[2::2] - (k * sin) @ state.x[1::2]
+        added = (3.0 * coefficients * q**2)[:, None] * u + (2.0 * rates * np.abs(speed))[:, None] * v
+        return np.concatenate((v, -stiffness @ u - damping @ v - added)).ravel()
+
+    period = 2.0 * np.pi / state.rate
+    solution = solve_ivp(field, (0.0, period), np.eye(2 * n).ravel(), method="DOP853", rtol=1e-9, atol=1e-11)
+    expected = np.linalg.eigvals(solution.y[:, -1].reshape(2 * n, 2 * n))
+    difference, _ = differences(mu, errors, expected)
+    assert np.all(difference < 1e-7)

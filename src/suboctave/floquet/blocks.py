@@ -58,8 +58,6 @@ class Blocks(NamedTuple):
         Sizes of its entries, summed over the channels that drive, (B, G).
     coupling
         G B and G L B of every block, (B, 2, 2 G G), by q and q', channels that read and that drive.
-    stiffening
-        How much an impulse of stiffness in a channel adds to squared rates by the blocks before each, (B + 1, G).
     shifting
         How far stiffness and damping of a channel shift the exponents, to first order, (2, S, G); of double ones zero.
     coupled
@@ -80,7 +78,6 @@ class Blocks(NamedTuple):
     flexibility: Array
     yielding: Array
     coupling: Array
-    stiffening: Array
     shifting: ComplexArray
     coupled: int
     active: np.ndarray
@@ -266,10 +263,6 @@ def _arranged(parts: _Parts, n: int, left: Array, right: Array, active: np.ndarr
     first = np.concatenate(([0], np.cumsum([len(parts.matrices[i]) for i in order]))).astype(np.int64)
     into = np.concatenate([driven[i] for i in order])
     out = np.concatenate([read[i] for i in order], axis=2)
-    driving = np.array([np.linalg.norm(driven[i], axis=0) for i in order])
-    reading = np.array([np.linalg.norm(read[i], axis=2) for i in order])
-    stiffening = np.zeros((len(order) + 1, groups))
-    stiffening[1:] = np.cumsum(driving * reading[:, 1], axis=0)
     coupling = np.zeros((len(order), 2, 2, groups, groups))
     for b, i in enumerate(order):
         coupling[b, 0], coupling[b, 1] = read[i] @ driven[i], read[i] @ parts.matrices[i] @ driven[i]
@@ -281,7 +274,7 @@ def _arranged(parts: _Parts, n: int, left: Array, right: Array, active: np.ndarr
     return Blocks(
         motion, first, rates[order], decays, exponents, into, np.ascontiguousarray(out), flexibility,
         np.abs(flexibility).sum(axis=2),
-        coupling.reshape(len(order), 2, -1), stiffening, shifting, int(coupled.sum()), active, rounding,
+        coupling.reshape(len(order), 2, -1), shifting, int(coupled.sum()), active, rounding,
     )  # fmt: skip
 
 

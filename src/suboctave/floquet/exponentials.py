@@ -147,14 +147,23 @@ def _times(span, times, left, rate):
 
 @kernel(fastmath=_FAST, error_model="numpy")
 def _kinds(spans, stretch):
-    """A number for every panel, the same for those that follow one another and are the same."""
-    kinds = np.zeros(spans.shape[0], dtype=np.int64)
-    for p in range(1, spans.shape[0]):
-        kinds[p] = kinds[p - 1] + (1 if stretch[p] != stretch[p - 1] else 0)
-        for j in range(spans.shape[1]):
-            if kinds[p] == kinds[p - 1] and abs(spans[p, j] - spans[p - 1, j]) > 1e-12 * spans[p, j]:
-                kinds[p] = kinds[p - 1] + 1
-    return kinds
+    """A number for every panel, the same for those of one stretch that are the same, and the first of every kind."""
+    kinds, first = np.empty((2, spans.shape[0]), dtype=np.int64)
+    count = begin = 0
+    for p in range(spans.shape[0]):
+        if p == 0 or stretch[p] != stretch[p - 1]:
+            begin = count
+        kinds[p] = count
+        for d in range(begin, count):
+            same = True
+            for j in range(spans.shape[1]):
+                same = same and abs(spans[p, j] - spans[first[d], j]) <= 1e-12 * spans[p, j]
+            if same:
+                kinds[p] = d
+                break
+        if kinds[p] == count:
+            first[count], count = p, count + 1
+    return kinds, first[:count]
 
 
 @kernel(fastmath=_FAST, error_model="numpy")
@@ -162,67 +171,132 @@ def structure(spans, stretch, forms):
     """What blocks make of initial states and forces on panels with dt/ds = spans (P, m).
 
     stretch (P,): which of the forms (`blocks.Forms`) each panel has; S states. Returns which kind each panel is, (P,),
-    a panel like the one before being of the same kind, and for each kind
+    those of one stretch that are the same being of the same kind, and for each kind
 
     - moved (D, blocks, 2, 2): exp(L t) over the panel
+    - e (D, blocks, 2, m): e_0, e_1 at the nodes
+    - w (D, 2 blocks, m m): w_0, w_1 of every block, from each of the nodes to all of them
+    - made (D, G): of which channels the rest is known, see `act`
     - reading (D, 2, G m, S): q and q' at the nodes from initial states
     - influence (D, 2, G m, G m): the same from forces at the nodes
     - entering (D, S, G m): final states from forces at the nodes.
     """
-    motion, first, driven, read = forms.motion, forms.first, forms.driven, forms.read
-    kinds = _kinds(spans, stretch)
-    size, groups = driven.shape[1:]
-    m, most, count = ORDER, motion.shape[1], kinds[-1] + 1
-    moved, reading = np.zeros((count, most, 2, 2)), np.empty((count, 2, groups * m, size))
-    influence, entering = np.empty((count, 2, groups * m, groups * m)), np.empty((count, size, groups * m))
+    motion, first = forms.motion, forms.first
+    kinds, panel = _kinds(spans, stretch)
+    size, groups = forms.driven.shape[1:]
+    m, most, count = ORDER, motion.shape[1], panel.shape[0]
+    moved, e, w = np.zeros((count, most, 2, 2)), np.zeros((count, most, 2, m)), np.zeros((count, 2 * most, m * m))
     times, left, rate = np.empty(m - 1), np.empty((m - 1, _POINTS)), np.empty((m - 1, _POINTS))
-    e, w, sums = np.zeros((2, m)), np.zeros((2 * most, m * m)), np.zeros((2 * groups * groups, m * m))
-    turned, e[0, 0] = np.empty(2), 1.0
-    for p in range(spans.shape[0]):
-        d, r = kinds[p], stretch[p]
-        if p > 0 and d == kinds[p - 1]:
-            continue
+    to = np.zeros((2, m * m))
+    for d in range(count):
+        p, r = panel[d], stretch[panel[d]]
         uniform = _times(spans[p], times, left, rate)
         for b in range(most):
-            s, wide, v = first[r, b], first[r, b + 1] - first[r, b], w[2 * b : 2 * b + 2]
+            wide = first[r, b + 1] - first[r, b]
             if wide == 0:
-                # behind the last block
-                for l in range(m * m):
-                    v[0, l] = v[1, l] = 0.0
-                continue
+                break  # behind the last block
             # one number counts as a double one
             mean = 0.5 * (motion[r, b, 0, 0] + motion[r, b, wide - 1, wide - 1])
             half = 0.5 * (motion[r, b, 0, 0] - motion[r, b, wide - 1, wide - 1])
             square = half * half + motion[r, b, 0, 1] * motion[r, b, 1, 0]
+            e[d, b, 0, 0] = 1.0
             if uniform:
-                _uniform(2.0 * spans[p, 0], mean, square, e, v)
+                _uniform(2.0 * spans[p, 0], mean, square, e[d, b], to)
             else:
-                _integrals(times, left, rate, mean, square, e, v)
+                _integrals(times, left, rate, mean, square, e[d, b], to)
+            for j in range(m):
+                for l in range(m):
+                    w[d, 2 * b, l * m + j], w[d, 2 * b + 1, l * m + j] = to[0, j * m + l], to[1, j * m + l]
             for i in range(wide):
                 for k in range(wide):
-                    moved[d, b, i, k] = e[1, m - 1] * motion[r, b, i, k] + (e[0, m - 1] if i == k else 0.0)
-                for g in range(groups):
-                    turned[0] = turned[1] = 0.0
+                    moved[d, b, i, k] = e[d, b, 1, m - 1] * motion[r, b, i, k] + (e[d, b, 0, m - 1] if i == k else 0.0)
+    made, nodes = np.zeros((count, groups), dtype=np.int64), groups * m
+    reading, influence = np.empty((count, 2, nodes, size)), np.empty((count, 2, nodes, nodes))
+    return kinds, moved, e, w, made, reading, influence, np.empty((count, size, nodes))
+
+
+@kernel(fastmath=_FAST, error_model="numpy")
+def act(structures, d, forms, r, acts, moving):
+    """Know of a kind of panels d with the form r what the channels that act, (G,), make of one another, without q' if
+    none of them has damping.
+    """
+    _kinds, _moved, e, w, made, reading, influence, entering = structures
+    m, groups, parts = ORDER, acts.shape[0], 2 if moving else 1
+    motion, first, driven, read = forms.motion[r], forms.first[r], forms.driven[r], forms.read[r]
+    channels, count = np.empty(groups, dtype=np.int64), 0
+    for g in range(groups):
+        made[d, g] = parts if acts[g] else 0
+        if acts[g]:
+            channels[count], count = g, count + 1
+    for b in range(motion.shape[0]):
+        s, wide = first[b], first[b + 1] - first[b]
+        for i in range(wide):
+            for n in range(count):
+                g, turned = channels[n], 0.0
+                for k in range(wide):
+                    turned += motion[b, i, k] * driven[s + k, g]
+                for l in range(m):
+                    at = l * m + m - 1
+                    entering[d, s + i, g * m + l] = w[d, 2 * b, at] * driven[s + i, g] + w[d, 2 * b + 1, at] * turned
+                for part in range(parts):
+                    turned = 0.0
                     for k in range(wide):
-                        turned[0] += motion[r, b, i, k] * driven[r, s + k, g]
+                        turned += read[part, g, s + k] * motion[b, k, i]
                     for j in range(m):
-                        l = (m - 1) * m + j
-                        entering[d, s + i, g * m + j] = v[0, l] * driven[r, s + i, g] + v[1, l] * turned[0]
-                    for part in range(2):
-                        turned[1] = 0.0
-                        for k in range(wide):
-                            turned[1] += read[r, part, g, s + k] * motion[r, b, k, i]
-                        for j in range(m):
-                            reading[d, part, g * m + j, s + i] = e[0, j] * read[r, part, g, s + i] + e[1, j] * turned[1]
-        if groups > 0 and most > 0:
-            np.dot(forms.coupling[r], w, sums)
-        for part in range(2):
+                        value = e[d, b, 0, j] * read[part, g, s + i] + e[d, b, 1, j] * turned
+                        reading[d, part, g * m + j, s + i] = value
+    pairs, sums = np.empty((count, w.shape[1])), np.zeros((count, m * m))
+    for part in range(parts):
+        for n in range(count):
+            g = channels[n]
+            for i in range(count):
+                for b in range(w.shape[1]):
+                    pairs[i, b] = forms.coupling[r, (part * groups + g) * groups + channels[i], b]
+            if w.shape[1] > 0:
+                np.dot(pairs, w[d], sums)
+            for i in range(count):
+                h = channels[i]
+                for j in range(m):
+                    for l in range(m):
+                        influence[d, part, g * m + j, h * m + l] = sums[i, l * m + j]
+                    if part == 0:
+                        influence[d, 0, g * m + j, h * m + j] += forms.flexible[r, g, h]
+
+
+@kernel(fastmath=_FAST, error_model="numpy")
+def along(e, w, motion, first, driven, force, start, since, states):
+    """The states (m, S) at the nodes of a panel, from the node `since` on, from those at its beginning, `start` (S, 1),
+    and forces at the nodes (G m,); e, w: see `structure`, of one kind.
+    """
+    m, groups = ORDER, driven.shape[1]
+    own, ends = np.zeros((2, m)), np.empty((2, m))
+    for b in range(motion.shape[0]):
+        s, wide = first[b], first[b + 1] - first[b]
+        if wide == 0:
+            break  # behind the last block
+        for i in range(wide):
+            for l in range(m):
+                own[i, l] = 0.0
             for g in range(groups):
-                for h in range(groups):
-                    for j in range(m):
-                        for l in range(m):
-                            value = sums[(part * groups + g) * groups + h, j * m + l]
-                            influence[d, part, g * m + j, h * m + l] = value
-                        if part == 0:
-                            influence[d, 0, g * m + j, h * m + j] += forms.flexible[r, g, h]
-    return kinds, moved, reading, influence, entering
+                for l in range(m):
+                    own[i, l] += driven[s + i, g] * force[g * m + l]
+        here, other = start[s, 0], start[s + 1, 0] if wide == 2 else 0.0
+        a, back, across, c = motion[b, 0, 0], motion[b, 0, 1], motion[b, 1, 0], motion[b, 1, 1]
+        if wide == 1:
+            # one state alone: nothing of a second
+            back = across = 0.0
+            for l in range(m):
+                own[1, l] = 0.0
+        for j in range(since, m):
+            ends[0, j] = e[b, 0, j] * here + e[b, 1, j] * (a * here + back * other)
+            ends[1, j] = e[b, 0, j] * other + e[b, 1, j] * (across * here + c * other)
+        for l in range(m):
+            x, y = own[0, l], own[1, l]
+            u, v = a * x + back * y, across * x + c * y
+            for j in range(since, m):
+                even, odd = w[2 * b, l * m + j], w[2 * b + 1, l * m + j]
+                ends[0, j] += even * x + odd * u
+                ends[1, j] += even * y + odd * v
+        for i in range(wide):
+            for j in range(since, m):
+                states[j, s + i] = ends[i, j]

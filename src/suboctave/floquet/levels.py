@@ -53,7 +53,7 @@ class Level:
     motion, first, driven, read, coupling, rates, decays, flexibility
         (B, 2, 2), (B + 1,), (S, G), (2, G, S), (B, 2, 2 G G), (B,), (B,), (B, G, G).
     stiffening
-        How much an impulse of stiffness in a channel adds to squared rates, (G,).
+        How fast a unit force in one channel makes another move, (G, G): what stiffness adds to squared rates.
     flexible
         R of what has no states, (G, G).
     left_out
@@ -238,14 +238,14 @@ def _level(blocks: Blocks, slow: int, few: States | None = None, flexible: Array
     ]
     first = np.concatenate((blocks.first[: slow + 1], own + few.first[1:]))
     rates, decays = (of_blocks(np.maximum, part, first) for part in (np.abs(exponents), exponents.real))
-    drives, moves = (of_blocks(np.add, part**2, few.first) for part in (few.driven, few.read[1].T))
     springs = np.zeros((count, count)) + flexible
+    coupling = np.concatenate((blocks.coupling[:slow], few.coupling))
     return Level(
         slow, own, np.concatenate((blocks.motion[:slow], few.motion)), first,
         np.concatenate((blocks.driven[:own], few.driven)), np.concatenate((blocks.read[:, :, :own], few.read), axis=2),
-        np.concatenate((blocks.coupling[:slow], few.coupling)), rates, decays,
+        coupling, rates, decays,
         np.concatenate((blocks.flexibility[:slow], *(one[None] for one in bending))),
-        blocks.stiffening[slow] + np.sqrt(drives * moves).sum(axis=0), springs,
+        np.abs(coupling[:, 0].sum(axis=0)).reshape(2, count, count)[1], springs,
         left_out(blocks, slow, few, exponents[own:], springs) if slow < blocks.coupled else None,
         int(first[-1]), float(decays.min(initial=0.0)), _sizes(blocks, slow),
     )  # fmt: skip

@@ -11,7 +11,8 @@ nodes, and between the nodes the blocks move as they do:
     z(t_j) = exp(L t_j) z_0 + sum_l W_jl B F_l,    W_jl = int_0^t_j exp(L (t_j - t)) P_l(t) dt = w_0 + w_1 L,
 
 P_l Lagrange's polynomials. Panels are as long as polynomials follow the forces, whatever the blocks do. `structure`
-(`exponentials`) has these matrices, the same on all panels of one length. `march` then solves for the forces of the
+(`exponentials`) has these matrices, the same on all panels of one length, and `act` what channels that act make of one
+another; the others are followed through the states. `march` then solves for the forces of the
 channels that act on a panel, a system as large as these have nodes; where none acts the blocks just go on. Constant
 stiffnesses of contacts are within the blocks (`forms`): as contacts begin and end, the states of one form become
 those of the next. With forces as polynomials the method is of order 12 at a panel's end, as Lobatto IIIA is (Hairer &
@@ -25,6 +26,7 @@ import math
 import numpy as np
 
 from suboctave.compiled import kernel
+from suboctave.floquet.exponentials import act, along
 from suboctave.floquet.time_mesh import HIGHEST, ORDER
 from suboctave.harmonic.elimination import eliminate
 
@@ -33,8 +35,9 @@ _FAST = {"reassoc", "contract", "nsz"}
 #: relative errors of the entries of a monodromy matrix by rounding
 _ROUNDING = 1e-15
 _TINY = float(np.finfo(float).tiny)
-#: the first column, as a number that kernels are not compiled for once more
+#: the first column or node and the last one, as numbers that kernels are not compiled for once more
 _FIRST = np.int64(0)
+_LAST = np.int64(ORDER - 1)
 
 
 @kernel(fastmath=_FAST, error_model="numpy")
@@ -68,7 +71,7 @@ def _lower(values, row):
 @kernel(fastmath=_FAST, error_model="numpy")
 def _tangents(law, loose, active, p, forced, values, acts, rows):
     """Forces, stiffness and damping at the nodes of panel p into values (3, G m), which channels act there into acts
-    (G,), and their nodes into rows; returns how many these are, and whether any has damping.
+    (G,), and their nodes into rows, one node after the other; returns how many these are, and whether any has damping.
     """
     m, count, moving = ORDER, 0, False
     for g in range(active.shape[0]):
@@ -79,47 +82,85 @@ def _tangents(law, loose, active, p, forced, values, acts, rows):
             values[1, row + j] += loose[active[g], p]
             stiff, moves = stiff or values[1, row + j] != 0.0, moves or values[2, row + j] != 0.0
         acts[g], moving = stiff or moves, moving or moves
-        for j in range(m if acts[g] else 0):
-            rows[count] = row + j
-            count += 1
         if forced:
             if stiff:
                 _lower(values[1], row)
             if moves:
                 _lower(values[2], row)
+    for j in range(m):
+        for g in range(active.shape[0]):
+            if acts[g]:
+                rows[count], count = g * m + j, count + 1
     return count, moving
 
 
 @kernel(fastmath=_FAST, error_model="numpy")
-def _solve(reading, influence, total, values, acts, rows, count, moving, forced, a, seen, f, speed):
-    """Forces at the nodes `rows`, count of them, into f, from states `total` at a panel's start; a, seen and speed are
-    room to work in.
+def _still(e, w, motion, first, driven, r, acts, start, given, states):
+    """The states (m, S) that forces r of channels that do not act make from none, `start`; `given` (G m,) is room."""
+    some = False
+    for row in range(r.shape[0]):
+        given[row] = 0.0 if acts[row // ORDER] else r[row]
+        some = some or acts[row // ORDER]
+    along(e, w, motion, first, driven, given, start, _FIRST if some else _LAST, states)
+
+
+@kernel(fastmath=_FAST, error_model="numpy")
+def _known(read, flexible, states, felt, acts, values, rows, count, f):
+    """Forces at the nodes `rows`, count of them, as far as they are known, into the last column of f: r, and if any is
+    felt what those r that do not act make of stiffness and damping, by the states (m, S) that follow from these.
     """
-    columns = total.shape[1]
-    r, k, c = values[0], values[1], values[2]
+    last = f.shape[1] - 1
+    for i in range(count):
+        g, j, q, v = rows[i] // ORDER, rows[i] % ORDER, 0.0, 0.0
+        for s in range(states.shape[1] if felt else 0):
+            q += read[0, g, s] * states[j, s]
+            v += read[1, g, s] * states[j, s]
+        for h in range(acts.shape[0]):
+            if not acts[h]:
+                q += flexible[g, h] * values[0, h * ORDER + j]
+        f[i, last] = values[0, rows[i]] + values[1, rows[i]] * q + values[2, rows[i]] * v
+
+
+@kernel(fastmath=_FAST, error_model="numpy")
+def _room(forces, groups, size, columns):
+    """Arrays for `_solve` to work in."""
+    equations, begin, after = np.empty((forces, forces)), np.empty((groups, groups)), np.empty((forces, groups))
+    return equations, begin, after, np.empty((forces, size)), np.empty((forces, columns))
+
+
+@kernel(fastmath=_FAST, error_model="numpy")
+def _solve(reading, influence, total, values, rows, count, moving, f, room):
+    """Forces at the nodes `rows`, count of them, from states `total` at a panel's start, and f as far as these are
+    known, into f; room: arrays to work in.
+    """
+    a, begin, after, seen, speed = room
+    columns, here, k, c = total.shape[1], count // ORDER, values[1], values[2]
     for part in range(2 if moving else 1):
+        of = k if part == 0 else c
         for i in range(count):
             for s in range(total.shape[0]):
-                seen[i, s] = reading[part, rows[i], s]
-        np.dot(seen[:count], total, speed[:count] if part > 0 else f[:count])
+                seen[i, s] = of[rows[i]] * reading[part, rows[i], s]
+        np.dot(seen[:count], total, speed[:count])
+        for i in range(count):
+            for j in range(columns):
+                f[i, j] += speed[i, j]
+    # at the first node only what has no states answers at once
     for i in range(count):
         row = rows[i]
-        for j in range(columns):
-            f[i, j] *= k[row]
-        for j in range(columns if moving else 0):
-            f[i, j] += c[row] * speed[i, j]
-        for l in range(count):
-            a[i, l] = -k[row] * influence[0, row, rows[l]]
-        for l in range(count if moving else 0):
-            a[i, l] -= c[row] * influence[1, row, rows[l]]
-        a[i, i] += 1.0
-        # forces that are known
-        for l in range(r.shape[0] if forced and count < r.shape[0] else 0):
-            if not acts[l // ORDER]:
-                f[i, columns - 1] += (k[row] * influence[0, row, l] + c[row] * influence[1, row, l]) * r[l]
-        if forced:
-            f[i, columns - 1] += r[row]
-    eliminate(a, f, count)
+        for l in range(here if i < here else count):
+            value = k[row] * influence[0, row, rows[l]] + (c[row] * influence[1, row, rows[l]] if moving else 0.0)
+            if i < here:
+                begin[i, l] = (1.0 if i == l else 0.0) - value
+            elif l < here:
+                after[i, l] = value
+            else:
+                a[i - here, l - here] = (1.0 if i == l else 0.0) - value
+    eliminate(begin, f, here)
+    for i in range(here, count):
+        for l in range(here):
+            for j in range(columns):
+                f[i, j] += after[i, l] * f[l, j]
+    eliminate(a, f[here:count], count - here)
 
 
 @kernel(fastmath=_FAST, error_model="numpy")
@@ -159,6 +200,27 @@ def _enter(entering, rows, count, f, packed, added, total):
 
 
 @kernel(fastmath=_FAST, error_model="numpy")
+def _made(made, acts, parts):
+    """Whether all that is wanted of the channels that act, (G,), is known; made: see `structure`."""
+    known = True
+    for g in range(acts.shape[0]):
+        known = known and (not acts[g] or made[g] >= parts)
+    return known
+
+
+@kernel(fastmath=_FAST, error_model="numpy")
+def _note(r, acts, rows, count, f, acting, solved):
+    """Keep which channels act on a panel, and all forces there: f at the nodes `rows`, count of them, else r."""
+    for l in range(count):
+        for j in range(f.shape[1]):
+            solved[rows[l], j] = f[l, j]
+    for g in range(acts.shape[0]):
+        acting[g] = acts[g]
+        for l in range(g * ORDER, g * ORDER + (0 if acts[g] else ORDER)):
+            solved[l, f.shape[1] - 1] = r[l]
+
+
+@kernel(fastmath=_FAST, error_model="numpy")
 def march(structures, stretch, forms, law, loose, kick, active, total, kept, acting, solved, states):
     """Perturbations along the panels of one period, and with them the response to the forces r.
 
@@ -186,15 +248,16 @@ def march(structures, stretch, forms, law, loose, kick, active, total, kept, act
     -----
     With r, stiffness and damping are polynomials of lower degree on panels.
     """
-    kinds, moved, reading, influence, entering = structures
+    kinds, moved, e, w, made, reading, influence, entering = structures
     groups, m, (size, columns) = active.shape[0], ORDER, total.shape
     free = kept.shape[0]
     forced, forces = columns > free, groups * m
     for i in range(free):
         total[kept[i], i] = 1.0
     values, acts, rows = np.empty((3, forces)), np.empty(groups, dtype=np.bool_), np.empty(forces, dtype=np.int64)
-    a, f, speed = np.empty((forces, forces)), np.empty((forces, columns)), np.empty((forces, columns))
-    seen, packed, added = np.empty((forces, size)), np.empty(size * forces), np.empty((size, columns))
+    f, room = np.empty((forces, columns)), _room(forces, groups, size, columns)
+    packed, added = np.empty(size * forces), np.empty((size, columns))
+    still, forward, given = np.zeros((size, 1)), np.empty((m, size)), np.empty(forces)
     waiting, later, now = moved[0].copy(), False, -1
     for p in range(kinds.shape[0]):
         d, kicked, begins = kinds[p], False, stretch[p] != now
@@ -211,28 +274,29 @@ def march(structures, stretch, forms, law, loose, kick, active, total, kept, act
         first, driven = forms.first[now], forms.driven[now]
         for g in range(groups if kicked else 0):
             if kick[active[g], p] != 0.0:
-                _kick(kick[active[g], p], reading[d, 0, g * m], driven[:, g], total)
+                _kick(kick[active[g], p], forms.read[now, 0, g], driven[:, g], total)
+        felt = forced and count < forces
+        if felt:
+            _still(e[d], w[d], forms.motion[now], first, driven, values[0], acts, still, given, forward)
         if count > 0:
-            for s in range(size if forced else 0):
-                for j in range(columns):
-                    states[p, s, j] = total[s, j]
-            _solve(reading[d], influence[d], total, values, acts, rows, count, moving, forced, a, seen, f, speed)
+            f[:count] = 0.0
+            if forced:
+                states[p] = total
+                _known(forms.read[now], forms.flexible[now], forward, felt, acts, values, rows, count, f)
+            if not _made(made[d], acts, 2 if moving else 1):
+                act(structures, d, forms, now, acts, moving)
+            _solve(reading[d], influence[d], total, values, rows, count, moving, f, room)
             _turn(moved[d], first, _FIRST, columns, total)
             _enter(entering[d], rows, count, f, packed, added, total)
-            for l in range(count if forced else 0):
-                for j in range(columns):
-                    solved[p, rows[l], j] = f[l, j]
         else:
             for b in range(moved.shape[1]):
                 _follow(moved[d, b], waiting[b], later)
             later = True
             _turn(moved[d], first, free, columns, total)
-        for g in range(groups if forced else 0):
-            acting[p, g] = acts[g]
-            for l in range(g * m, g * m + (0 if acts[g] else m)):
-                solved[p, l, free] = values[0, l]
-                for s in range(size):
-                    total[s, free] += entering[d, s, l] * values[0, l]
+        if forced:
+            _note(values[0], acts, rows, count, f, acting[p], solved[p])
+        for s in range(size if felt else 0):
+            total[s, free] += forward[m - 1, s]
     if later:
         _turn(waiting, forms.first[now], _FIRST, free, total)
     if forms.turning[now + 1]:
@@ -248,9 +312,9 @@ def response(structures, stretch, forms, active, acting, solved, states, start, 
     structures, stretch, forms, active, acting, solved, states: see `march`; whole (S, kept + 1): states at the end of
     the period, kept (kept,): which of them these are; path (C, 2, N): the motion along all channels.
     """
-    kinds, moved, reading, influence, entering = structures
+    kinds, _moved, e, w, _made, _reading, _influence, _entering = structures
     groups, m, free, size = active.shape[0], ORDER, start.shape[0], whole.shape[0]
-    state, force, now = np.empty((size, 1)), np.empty(groups * m), -1
+    state, force, forward, now = np.empty((size, 1)), np.empty(groups * m), np.empty((m, size)), -1
     for s in range(size):
         state[s, 0] = whole[s, free]
         for i in range(free):
@@ -275,19 +339,19 @@ def response(structures, stretch, forms, active, acting, solved, states, start, 
             force[row] = solved[p, row, free]
             for i in range(free if acting[p, row // m] else 0):
                 force[row] += solved[p, row, i] * start[i, 0]
-        for part in range(2):
-            for row in range(groups * m):
-                value = 0.0
-                for s in range(size):
-                    value += reading[d, part, row, s] * state[s, 0]
-                for l in range(groups * m):
-                    value += influence[d, part, row, l] * force[l]
+        along(e[d], w[d], forms.motion[now], forms.first[now], forms.driven[now], force, state, _FIRST, forward)
+        for g in range(groups):
+            for j in range(m):
                 # the last node of a panel is the first of the next
-                out[active[row // m], part, p * (m - 1) + row % m] = value
-        _turn(moved[d], forms.first[now], _FIRST, state.shape[1], state)
+                at, q, v = p * (m - 1) + j, 0.0, 0.0
+                for s in range(size):
+                    q += forms.read[now, 0, g, s] * forward[j, s]
+                    v += forms.read[now, 1, g, s] * forward[j, s]
+                for h in range(groups):
+                    q += forms.flexible[now, g, h] * force[h * m + j]
+                out[active[g], 0, at], out[active[g], 1, at] = q, v
         for s in range(size):
-            for l in range(groups * m):
-                state[s, 0] += entering[d, s, l] * force[l]
+            state[s, 0] = forward[m - 1, s]
     worst = 0.0
     for channel in active:
         most, limit = 0.0, _TINY

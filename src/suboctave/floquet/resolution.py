@@ -122,21 +122,25 @@ def _forces(law, loose, active, p, rates, flexibility, stiffening, seen):
     """Rate of the forces on panel p, and the logarithms of the share of every block in them into seen (B,); see
     `divided`.
     """
-    a = rate = 0.0
+    groups = active.shape[0]
+    squares, rates_by, squared, rate = np.zeros(groups), np.zeros(groups), 0.0, 0.0
     for b in range(seen.shape[0]):
         seen[b] = 0.0
-    for g in range(active.shape[0]):
+    for g in range(groups):
         k = c = 0.0
         for j in range(p * (ORDER - 1), p * (ORDER - 1) + ORDER):
             k = max(k, abs(law[active[g], 1, j] + loose[active[g], p]))
             c = max(c, abs(law[active[g], 2, j]))
-        a += stiffening[g] * k
-        rate += stiffening[g] * c
+        # no eigenvalue is larger than the sum of a row's entries
+        for h in range(groups if k > 0.0 or c > 0.0 else 0):
+            squares[h] += stiffening[h, g] * k
+            rates_by[h] += stiffening[h, g] * c
+            squared, rate = max(squared, squares[h]), max(rate, rates_by[h])
         for b in range(seen.shape[0] if k > 0.0 or c > 0.0 else 0):
             seen[b] += (k + c * rates[b]) * abs(flexibility[b, g, g])
     for b in range(seen.shape[0]):
         seen[b] = math.log(seen[b]) if seen[b] > 0.0 else -np.inf
-    return math.sqrt(a) + rate
+    return math.sqrt(squared) + rate
 
 
 @kernel()

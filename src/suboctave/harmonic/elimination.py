@@ -36,6 +36,8 @@ _ROUNDING, _BESIDE = 1e-12, 1e-9
 _PARALLEL = 1e4
 #: least frequency that scales a state, relative to the largest
 _LEAST = 1e-6
+#: equations that are eliminated one by one, before all those behind them follow at once
+_BLOCK = 24
 #: no derivative by Omega, as a number that kernels are not compiled for once more
 _NONE = np.int64(0)
 
@@ -92,35 +94,87 @@ class Stack(NamedTuple):
 
 
 @kernel(fastmath=_FAST, error_model="numpy")
-def eliminate(a, b, n):
-    """Solve `a x = b`, n equations, for the columns of b, in place, by Gauss's elimination with pivots; zeros cost
-    nothing.
-    """
-    columns = b.shape[1]
-    for k in range(n):
-        best = k
-        for i in range(k + 1, n):
-            if abs(a[i, k]) > abs(a[best, k]):
-                best = i
-        if best != k:
-            for j in range(k, n):
-                a[k, j], a[best, j] = a[best, j], a[k, j]
-            for j in range(columns):
-                b[k, j], b[best, j] = b[best, j], b[k, j]
-        for i in range(k + 1, n):
-            if a[i, k] != 0.0:
-                f = a[i, k] / a[k, k]
-                for j in range(k + 1, n):
-                    a[i, j] -= f * a[k, j]
-                for j in range(columns):
-                    b[i, j] -= f * b[k, j]
-    for i in range(n - 1, -1, -1):
-        for k in range(i + 1, n):
-            if a[i, k] != 0.0:
-                for j in range(columns):
-                    b[i, j] -= a[i, k] * b[k, j]
+def _behind(a, b, begin, end, n):
+    """The equations behind those from begin to end, n in all, without the unknowns of these, in place: b too."""
+    rows, more, columns = n - end, n - end, b.shape[1]
+    factors, known = (
+        np.empty((rows, end - begin), dtype=a.dtype),
+        np.empty((end - begin, more + columns), dtype=a.dtype),
+    )
+    for k in range(end - begin):
+        for i in range(rows):
+            factors[i, k] = a[end + i, begin + k]
+        for j in range(more):
+            known[k, j] = a[begin + k, end + j]
         for j in range(columns):
-            b[i, j] /= a[i, i]
+            known[k, more + j] = b[begin + k, j]
+    taken = np.dot(factors, known)
+    for i in range(rows):
+        for j in range(more):
+            a[end + i, end + j] -= taken[i, j]
+        for j in range(columns):
+            b[end + i, j] -= taken[i, more + j]
+
+
+@kernel(fastmath=_FAST, error_model="numpy")
+def _before(a, b, begin, end):
+    """Take what is known of the unknowns from begin to end from the right sides b of those before, in place."""
+    columns = b.shape[1]
+    factors, known = np.empty((begin, end - begin), dtype=a.dtype), np.empty((end - begin, columns), dtype=a.dtype)
+    for k in range(end - begin):
+        for i in range(begin):
+            factors[i, k] = a[i, begin + k]
+        for j in range(columns):
+            known[k, j] = b[begin + k, j]
+    taken = np.dot(factors, known)
+    for i in range(begin):
+        for j in range(columns):
+            b[i, j] -= taken[i, j]
+
+
+@kernel(fastmath=_FAST, error_model="numpy")
+def eliminate(a, b, n):
+    """Solve `a x = b`, n equations, for the columns of b, in place, by Gauss's elimination with pivots, block by block;
+    zeros within a block cost nothing.
+    """
+    columns, last = b.shape[1], (n - 1) // _BLOCK
+    for block in range(last + 1):
+        begin, end = block * _BLOCK, min(n, (block + 1) * _BLOCK)
+        for k in range(begin, end):
+            best = k
+            for i in range(k + 1, n):
+                if abs(a[i, k]) > abs(a[best, k]):
+                    best = i
+            if best != k:
+                for j in range(begin, n):
+                    a[k, j], a[best, j] = a[best, j], a[k, j]
+                for j in range(columns):
+                    b[k, j], b[best, j] = b[best, j], b[k, j]
+            for i in range(k + 1, n):
+                if a[i, k] != 0.0:
+                    a[i, k] /= a[k, k]
+                    for j in range(k + 1, end):
+                        a[i, j] -= a[i, k] * a[k, j]
+        for i in range(begin, end):
+            for k in range(begin, i):
+                if a[i, k] != 0.0:
+                    for j in range(end, n):
+                        a[i, j] -= a[i, k] * a[k, j]
+                    for j in range(columns):
+                        b[i, j] -= a[i, k] * b[k, j]
+        if end < n:
+            _behind(a, b, begin, end, n)
+    for block in range(last, -1, -1):
+        begin, end = block * _BLOCK, min(n, (block + 1) * _BLOCK)
+        for i in range(end - 1, begin - 1, -1):
+            for k in range(i + 1, end):
+                if a[i, k] != 0.0:
+                    for j in range(columns):
+                        b[i, j] -= a[i, k] * b[k, j]
+            for j in range(columns):
+                b[i, j] /= a[i, i]
+        if begin > 0:
+            _before(a, b, begin, end)
 
 
 @kernel(fastmath={"contract"})
