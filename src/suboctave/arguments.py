@@ -58,6 +58,7 @@ from suboctave.readings import (
 
 Given = TypeVar("Given")
 _PACKAGE = "suboctave."
+_LENGTH = len(_PACKAGE)
 #: the largest count of anything
 _MOST = 100_000_000
 #: names of keywords that a message lists
@@ -307,7 +308,7 @@ def _compared(function: Any, owner: type | None, checks: Checks) -> Any:
     @functools.wraps(function)
     def compared(*positional: Any, **named: Any) -> Any:
         nonlocal table
-        if inside and sys._getframe(1).f_globals.get("__name__", "").startswith(_PACKAGE):
+        if inside and sys._getframe(1).f_globals.get("__name__", "")[:_LENGTH] == _PACKAGE:
             return function(*positional, **named)
         if table is None:
             table = _Table(function, owner, checks)

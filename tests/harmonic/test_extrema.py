@@ -18,7 +18,7 @@ def find(c):
 
 
 def passing(*args):
-    pairs, count, before, after = passages(*args)
+    pairs, count, before, after, _ = passages(*args)
     return pairs[:count], before, after
 
 
@@ -73,11 +73,11 @@ def test_all_extrema_are_paired():
     """Those that pass first; a maximum with a maximum, a ripple that has merged with none."""
     one, other = find([0.0, 1.0, 0.4]), find([0.0, 1.2, 0.0])
     assert (len(one[0]), len(other[0])) == (4, 2)
-    pairs, count, _, _ = passages(*one, 1.45, *other, 1.45)
+    pairs, count, *_ = passages(*one, 1.45, *other, 1.45)
     assert (count, sorted(pairs[:, 1])) == (0, [0, 1])
     assert one[1][pairs[:, 0]].max() == pytest.approx(1.4)
     assert all((one[2][i] < 0.0) == (other[2][j] < 0.0) for i, j in pairs)
-    pairs, count, _, _ = passages(*one, 1.3, *other, 1.3)
+    pairs, count, *_ = passages(*one, 1.3, *other, 1.3)
     assert count == 1
     assert one[1][pairs[0, 0]] == pytest.approx(1.4)
     assert sorted(pairs[:, 1]) == [0, 1]

@@ -45,12 +45,10 @@ def contradicted(result: FloquetResult, integer: float, half: float) -> list[tup
     The signs are the parities of the real multipliers beyond +1 and beyond -1. They belong to the harmonics solved for,
     the multipliers to the motion completed by what it lacks: where the parities differ, the nearest one is between.
     """
-    if not result.applicable:
-        return []
-    mu, contradictions = result.multipliers, []
-    fold, double, _ = result.symmetric[0].tolist()
-    for target, solved, completed in ((1.0, integer, fold), (-1.0, half, double)):
-        if solved * completed < 0.0:
+    mu, contradictions, completed = result.multipliers, [], result.symmetric[0]
+    # of multipliers that are not known neither is less than nothing
+    for target, solved, of in ((1.0, integer, 0), (-1.0, half, 1)):
+        if solved * completed[of] < 0.0 and result.applicable:
             real = np.abs(mu.imag) <= 1e-12 * np.abs(mu)
             distance = np.where(real | ~real.any(), np.abs(mu - target), np.inf)
             nearest = int(np.argmin(distance))

@@ -103,18 +103,17 @@ class Bounds(Range):
         """See `Range.left`."""
         bound = self.passed(a, b)
         if bound is None:
-            return self._turned_beyond(a, b, newton)
+            turns = a.tangent[self.index(a.curve)] * b.tangent[self.index(b.curve)] < 0.0
+            return self._turned_beyond(a, b, newton) if turns else None
         return b if self.value(b) == bound else self._land(a, b, bound, newton)
 
     def _turned_beyond(self, a: CurvePoint, b: CurvePoint, newton: NewtonOptions) -> CurvePoint | None:
-        """The point on a bound that the curve passes between two neighbours and comes back through, by its cubic
-        interpolation; None if it does not.
+        """The point on a bound that a curve that turns between two neighbours passes and comes back through, by its
+        cubic interpolation; None if it does not.
         """
         step = b.arclength - a.arclength
         start, last = a.tangent[self.index(a.curve)] * step, b.tangent[self.index(b.curve)] * step
         before, way = self.value(a), self.value(b) - self.value(a)
-        if start * last >= 0.0:
-            return None
         # the slope is start + 2 half s + curve s^2
         half, curve = 3.0 * way - 2.0 * start - last, 3.0 * (start + last - 2.0 * way)
         share = -start / (half - math.copysign(math.sqrt(max(half * half - start * curve, 0.0)), start))

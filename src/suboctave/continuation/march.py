@@ -96,10 +96,19 @@ class Place:
 
     def __init__(self, point: CurvePoint) -> None:
         self.point = point
-        #: values of the parameter at its images
-        self._values = [image[point.curve.parameter] for image in point.curve.images(point.u)]
+        #: of the parameter at all its images
+        self._values = {image[point.curve.parameter] for image in point.curve.images(point.u)}
         #: its images in the discretisation of the last point
         self._images: tuple[Curve, list[Array]] | None = None
+
+    def near(self, point: CurvePoint, new: CurvePoint) -> bool:
+        """Whether the step from `point` to `new` may pass it, as far as the parameter tells."""
+        index = new.curve.parameter
+        reach = 1.5 * distance(new.u, point.u, new.weights) / new.weights[index]
+        for value in self._values:  # noqa: SIM110 - `any` takes three times as long
+            if -reach <= new.u[index] - value <= reach:
+                return True
+        return False
 
     def passed(self, point: CurvePoint, new: CurvePoint) -> CurvePoint | None:
         """It again, if the step from `point` to `new` passes it in the same direction."""
@@ -133,12 +142,6 @@ class Place:
         """
         w, own = new.weights, self.point
         step = distance(new.u, point.u, w)
-        here, reach = new.parameter, 1.5 * step / w[new.curve.parameter]
-        for value in self._values:
-            if abs(here - value) <= reach:
-                break
-        else:
-            return []
         passed = []
         if self._images is None or self._images[0] is not new.curve:
             self._images = (new.curve, new.curve.images(new.curve.transfer(own.u, own.curve)))
@@ -221,13 +224,12 @@ class March:
         if point.tangent[point.curve.parameter] * self.direction < 0.0:
             point = point.turned
         ranges = (Bounds(*self.bounds, attrgetter("parameter")), *self.others)
-        home = Place(self.home or point)
-        mark, marked = home, 0
+        home = mark = Place(self.home or point)
         yield point
         largest = point.curve.size(point.u)
         step = min(options.initial_step, options.max_step)
         behind: list[CurvePoint] = []
-        curve, bend, count = point.curve, 0.0, 1
+        curve, bend, count, marked = point.curve, 0.0, 1, 0
         while True:
             if count >= options.max_points:
                 self.ending = Ending(EndReason.MAX_POINTS, point.curve.where(point.u), str(options.max_points))
@@ -253,18 +255,19 @@ class March:
                 # from the point as it was solved for, not from what fewer harmonics made of it
                 curve = finer
                 continue
-            point = here
-            largest = max(largest, new.curve.size(new.u))
-            back = None if count < 3 else home.passed(point, new)
+            point, largest = here, max(largest, new.curve.size(new.u))
+            at_home = count > 2 and home.near(point, new)
+            back = home.passed(point, new) if at_home else None
             if back is not None:
                 self.closed, self.ending = True, Ending(EndReason.CLOSED)
                 yield back
                 return
-            if marked and count > marked + 3 and mark.passed(point, new) is not None:
+            at_mark = marked and mark.near(point, new)
+            if at_mark and count > marked + 3 and mark.passed(point, new) is not None:
                 self.ending = Ending(EndReason.ASTRAY, new.curve.where(new.u))
                 return
-            back_again = count > 3 and home.retraced(point, new, self.newton)
-            if back_again or (marked and mark.retraced(point, new, self.newton)):
+            back_again = at_home and count > 3 and home.retraced(point, new, self.newton)
+            if back_again or (at_mark and mark.retraced(point, new, self.newton)):
                 self.ending = Ending(EndReason.RETRACED, new.curve.where(new.u))
                 return
             landed: CurvePoint | None = None
@@ -314,8 +317,11 @@ class March:
     def _advance(self, point: CurvePoint, step: float, behind: list[CurvePoint]) -> tuple[CurvePoint, float, float]:
         """One accepted step: new point, distance between prediction and solution, angle between the tangents."""
         known, curve, options = [point, *behind], point.curve, self.stepping
-        points = np.array([curve.transfer(p.u, p.curve) for p in known])
-        tangents = np.array([curve.transfer(p.tangent, p.curve) for p in known])
+        both = [
+            (p.u, p.tangent) if p.curve is curve else (curve.transfer(p.u, p.curve), curve.transfer(p.tangent, p.curve))
+            for p in known
+        ]
+        points, tangents = np.array(both).swapaxes(0, 1).copy()
         order = len(known)
         while True:
             try:
@@ -455,7 +461,9 @@ def _joined(point: CurvePoint, new: CurvePoint) -> CurvePoint:
 
 def _rescaled(curve: Curve, point: CurvePoint, largest: float) -> CurvePoint:
     """A point carried over to `curve` as it is, with scaling and tangent length of the present amplitude."""
-    p, u, along = point, curve.transfer(point.u, point.curve), curve.transfer(point.tangent, point.curve)
+    p, u, along = point, point.u, point.tangent
+    if curve is not point.curve:
+        u, along = curve.transfer(u, point.curve), curve.transfer(along, point.curve)
     weights = curve.weights(u, largest)
     size = length(weights * along)
     if not 0.0 < size < math.inf:

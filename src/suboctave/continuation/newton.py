@@ -63,9 +63,9 @@ class NewtonOptions:
     longest: Length = math.inf
     rounding: bool = False
 
-    def share(self, step: Array) -> float:
-        """The share of a correction that is taken."""
-        return 1.0 if self.longest == math.inf else self.longest / max(self.longest, length(step))
+    def share(self, size: float) -> float:
+        """The share of a correction of some length that is taken."""
+        return 1.0 if size <= self.longest else self.longest / size
 
     def __post_init__(self) -> None:
         if not (self.tolerance < 1e-2 and self.correction < 1.0):
@@ -132,7 +132,7 @@ def correct(
 
     Raises ConvergenceError if the iterations do not contract or run out.
     """
-    plane = np.eye(1, len(guess), row)[0] if isinstance(row, int) else row
+    fixed, plane = (row, np.eye(1, len(guess), row)[0]) if isinstance(row, int) else (None, row)
     u, last, factor = guess.copy(), None, known
     way, before, contraction, first, previous = 0.0, 0.0, 0.0, 0.0, math.inf
     nearest: Solved[Equations] | None = None
@@ -143,11 +143,10 @@ def correct(
         if not math.isfinite(error):
             raise ConvergenceError(f"the residual is not finite at {curve.where(u)}")
         # the correction that Newton's method would still make is bounded by the square of the last, seen in its rate
-        left = previous if options.rounding and contraction == 0.0 else previous * min(contraction, 1.0)
-        settled = min(previous, left) <= options.correction
+        contracts = contraction < 1.0 and not (options.rounding and contraction == 0.0)
+        settled = (previous * contraction if contracts else previous) <= options.correction
         if error <= options.tolerance and (settled or (iteration == 0 and known is None)):
-            takes_over: Callable[[Evaluation], bool] | None = getattr(evaluation, "takes_over", None)
-            if factor is None or last is None or way > spare or takes_over is None or not takes_over(last):
+            if factor is None or last is None or way > spare or not _takes_over(evaluation, last):
                 factor = factorised(evaluation, plane, weights)
             return Solved(curve, u, evaluation, weights, factor, iteration, distance(u, guess, weights))
         if iteration == options.iterations:
@@ -162,14 +161,14 @@ def correct(
             raise ConvergenceError(f"the equations are singular at {curve.where(u)}")
         rhs = evaluation.residual
         step = factor.solve(rhs if plane is None else _beneath(rhs, plane.dot(weights * (u - guess))))
-        if isinstance(row, int):
-            step[row] = 0.0  # but for rounding of the factors it is
-        still = options.rounding and previous <= options.correction and length(step) <= _ROUNDING
+        if fixed is not None:
+            step[fixed] = 0.0  # but for rounding of the factors it is
+        size = length(step)
+        still = options.rounding and previous <= options.correction and size <= _ROUNDING
         if still and (nearest is None or error < nearest.evaluation.error):
             nearest = Solved(curve, u, evaluation, weights, factor, iteration, distance(u, guess, weights))
-        share = _decrease(curve, u, step / weights, error) if options.damped else options.share(step)
-        u, size = u - share * step / weights, length(step)
-        way, before = way + share * size, error
+        share = _decrease(curve, u, step / weights, error) if options.damped else options.share(size)
+        u, way, before = u - share * step / weights, way + share * size, error
         if iteration == 0:
             first = size
         else:
@@ -187,6 +186,12 @@ def correct(
     raise ConvergenceError(
         f"Newton's method did not converge near {where} (residual {error:.1e} after {iteration} iterations)"
     )
+
+
+def _takes_over(evaluation: Evaluation, other: Evaluation) -> bool:
+    """See `Evaluation`."""
+    takes_over: Callable[[Evaluation], bool] | None = getattr(evaluation, "takes_over", None)
+    return takes_over is not None and takes_over(other)
 
 
 def _beneath(vector: Array, number: float) -> Array:

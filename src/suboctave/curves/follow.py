@@ -190,6 +190,8 @@ class _Follower(Driver):
         return known if known is not None and known.point is point else Sample(point, self.settings.stability)
 
     def _plain(self, point: CurvePoint) -> CurvePoint:
+        if not isinstance(point.curve, BlownUp):
+            return point
         return plain_point(point, None if self.previous is None else self.previous.point)
 
     def _clear(self, a: CurvePoint, b: CurvePoint) -> bool:
@@ -414,14 +416,15 @@ class _Follower(Driver):
         events, missing = ([], []) if resting else self._changed_between(a, b)
         if missing:
             self._guard.doubt(a, b, "; ".join(_NOT_FOUND[name] for name in missing))
-        events = self._not_listed(events, a, b)
+        events = self._not_listed(events, a, b) if events else []
         unseen = ["PD"] * (self._watch is not None and PERIOD_DOUBLING.changed(a, b))
         complaint = self._count.complaint(b, [item.kind for _, item in events] + missing + unseen)
         if complaint is not None:
             self._guard.doubt(*complaint)
-        if not resting:
+        if not resting and self._guard.grazes(a, b):
             events += self._not_listed(self._grazings_between(a, b), a, b)
-        self.trace.bifurcations += behind_their_grazings(events)
+        if events:
+            self.trace.bifurcations += behind_their_grazings(events)
         if self._watch is not None and not resting:
             for located, p, q in self._watch.passed(a, b):
                 item = self._bifurcation(located, p, q)
@@ -429,8 +432,9 @@ class _Follower(Driver):
                     self._guard.doubt(p, q, _NOT_FOUND["PD"])
                 else:
                     self._insert(item)
-        crossed = (self._event(event, a, b) for event in self.settings.events)
-        self.trace.events += [item for item in crossed if item is not None]
+        for event in self.settings.events:
+            item = self._event(event, a, b)
+            self.trace.events += [] if item is None else [item]
 
     def _changed_between(self, a: Sample, b: Sample) -> tuple[list[tuple[float, Bifurcation]], list[str]]:
         """The bifurcations between two samples with their places, and the kinds whose tests change without one."""

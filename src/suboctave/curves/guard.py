@@ -139,7 +139,8 @@ class GuardedStep(Interior):
         self.multiple: list[Crossing] = []
         pending = [(old, new)]
         if self.size > _JUMP:
-            self._look_for_crossing(old, new)
+            if BRANCH_POINT in changes(old, new):
+                self._look_for_crossing(old, new)
             if not self.refused and self.size > FINEST and _disagreement(old.point, new.point) > _AGREE:
                 pending = self.cut(old, new, 0.5)
         self.examine(pending)
@@ -154,8 +155,10 @@ class GuardedStep(Interior):
         but not one that ends where the count is open.
         """
         first, *_, last = samples = self.inside
+        if first is samples[-2]:
+            return [last]
         kept, since = [first], set[BifurcationKind]()
-        for p, q in pairwise(samples) if len(samples) > 2 else ():
+        for p, q in pairwise(samples):
             now = set(changes(p, q))
             pairs = any(kind.name == "NS" for kind in now | since)
             crowded = now & since or (now and since and pairs and p.floquet.decided)
@@ -187,12 +190,12 @@ class GuardedStep(Interior):
 
     def doubt(self, p: Sample, q: Sample) -> tuple[float, str] | None:
         """See `Interior.doubt`."""
-        h = q.place - p.place
-        crossing = self._look_for_crossing(p, q)
+        h, kinds = q.place - p.place, changes(p, q)
+        crossing = self._look_for_crossing(p, q) if BRANCH_POINT in kinds else None
         if self.refused:
             return None
         told = resolved(p, q)
-        eventful = told and (compare(p, q).change != 0 or bool(changes(p, q)))
+        eventful = told and (bool(kinds) or compare(p, q).change != 0)
         doubt = self._doubt_at_event(p, q, crossing) if eventful else None
         if doubt is not None:
             return doubt
@@ -230,11 +233,9 @@ class GuardedStep(Interior):
         return rings is None or bool((rings[at, 0] != rings[at + 1, 0]).any())
 
     def _look_for_crossing(self, p: Sample, q: Sample) -> Crossing | None:
-        """The branch point between two samples; the step is refused if the orientation changes without one, which it
-        does not along one branch.
+        """The branch point between two samples between which the orientation changes; the step is refused where there
+        is none, as it does not change along one branch.
         """
-        if BRANCH_POINT not in changes(p, q):
-            return None
         known = next((crossing for crossing in self.crossings if crossing.between(p, q)), None)
         if known is None:
             known = self.steps.crossing(BRANCH_POINT, p, q)
@@ -270,7 +271,7 @@ class GuardedStep(Interior):
         """See `Interior.tests`: of equal multipliers with one, where there are as many all along. A family that passes
         the circle in the same step as a single one would go unseen, its zero being double.
         """
-        tests = [self.measures(one) for one in stencil]
+        tests = [self.measures(one) if self.turned else one.measures for one in stencil]
         if not resolved(*stencil):
             # but for the turn, which the curve itself tells
             return [one[:, :1] for one in tests]
@@ -358,43 +359,39 @@ def _explained(p: Sample, q: Sample) -> bool:
 
 def _too_fast(p: Sample, q: Sample, eventful: bool) -> bool:
     """Whether multipliers move too fast between two samples to be followed."""
-    told = _told((p, q))
-    if _movement(*(one.multipliers for one in told)) > MOVEMENT:
-        return True
-    ends = [one.distinct for one in told]
-    return not (eventful or (_keep_off(*ends) and _keep_off(*reversed(ends))))
+    a, b = p.floquet, q.floquet
+    return bool(_moves_too_fast(a.multipliers, b.multipliers, a.distinct, b.distinct, eventful))
 
 
 @kernel()
-def _keep_off(old, new):
-    """Whether new real multipliers near +1 or -1, where there are several, are farther from there than they have moved:
-    one that passes and another that comes back leave the number of those outside as it was, and the sign of products.
+def _moves_too_fast(old, new, before, behind, eventful):
+    """Whether a new multiplier of modulus above one half lies too far from all old ones; or, where nothing has changed,
+    of different ones before and behind a real one near +1 or -1, where there are several, has moved farther than it is
+    from there: one that passes and another that comes back leave the number of those outside as it was, and the sign of
+    products.
     """
-    for target in (1.0, -1.0):
-        near = 0
-        for mu in new:
-            near += mu.imag == 0.0 and abs(mu.real - target) < _CROWD
-        for mu in new:
-            if near > 1 and mu.imag == 0.0 and abs(mu.real - target) < _CROWD:
-                moved, clearance = np.inf, 0.0
-                for other in old:
-                    if other.imag == 0.0 and abs(mu.real - other.real) < moved:
-                        moved = abs(mu.real - other.real)
-                        clearance = min(abs(mu.real - target), abs(other.real - target))
-                if moved > clearance:
-                    return False
-    return True
-
-
-@kernel()
-def _movement(old, new):
-    """Largest distance from a new multiplier of modulus above one half to the nearest old one."""
-    largest = 0.0
     for mu in new:
         size = abs(mu)
         if size > 0.5:
             nearest = np.inf
             for other in old:
                 nearest = min(nearest, abs(mu - other))
-            largest = max(largest, nearest / max(1.0, size))
-    return largest
+            if nearest > MOVEMENT * max(1.0, size):
+                return True
+    if eventful:
+        return False
+    for first, last in ((before, behind), (behind, before)):
+        for target in (1.0, -1.0):
+            near = 0
+            for mu in last:
+                near += mu.imag == 0.0 and abs(mu.real - target) < _CROWD
+            for mu in last:
+                if near > 1 and mu.imag == 0.0 and abs(mu.real - target) < _CROWD:
+                    moved, clearance = np.inf, 0.0
+                    for other in first:
+                        if other.imag == 0.0 and abs(mu.real - other.real) < moved:
+                            moved = abs(mu.real - other.real)
+                            clearance = min(abs(mu.real - target), abs(other.real - target))
+                    if moved > clearance:
+                        return True
+    return False

@@ -31,7 +31,7 @@ from suboctave.continuation.point import between
 from suboctave.continuation.problem import Array
 from suboctave.curves.crossings import first_doubtful
 from suboctave.curves.events.grazings import height_gradient
-from suboctave.curves.sample import Sample
+from suboctave.curves.sample import YOUNG, Sample
 from suboctave.curves.trace import Unsettled
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.trigonometric import passages
@@ -97,10 +97,9 @@ class Steps:
 
     def contacts(self, p: Sample, q: Sample) -> Contacts:
         """What contacts do between two samples."""
-        known = self._contacts.get((p, q))
-        if known is None:
-            known = self._contacts[p, q] = contacts_between(p, q)
-        return known
+        if (p, q) not in self._contacts:
+            self._contacts[p, q] = contacts_between(p, q)
+        return self._contacts[p, q]
 
     def leading_to(self, old: Sample) -> list[Sample]:
         """The samples that a step from one is foretold from; the last one may have been solved again with other
@@ -122,15 +121,18 @@ class Steps:
 def contacts_between(p: Sample, q: Sample) -> Contacts:
     """What contacts do between two samples."""
     shrinking: list[tuple[int, float, float, bool]] = []
-    for n, (a, b, young_a, young_b) in enumerate(zip(p.gaps, q.gaps, p.young, q.young, strict=True)):
-        pairs, count, crossed, other = passages(a.tau, a.value, a.curve, a.level, b.tau, b.value, b.curve, b.level)
+    for n, (a, b) in enumerate(zip(p.gaps, q.gaps, strict=True)):
+        pairs, count, crossed, other, least = passages(
+            a.tau, a.value, a.curve, a.level, b.tau, b.value, b.curve, b.level
+        )
         if count > 0:
             i, j = pairs[0].tolist()
             return Contacts(_passage(*_rising(p, a, i), *_rising(q, b, j), q.place - p.place))
         if crossed != other:
             return Contacts(0.5)
-        if not (young_a or young_b):
+        if least >= YOUNG:
             continue
+        young_a, young_b = p.young[n], q.young[n]
         # one without its like has merged with a neighbour on its own side of the gap, which is no grazing
         for i, j in pairs.tolist():
             if young_a.get(i, math.inf) < _SHRINKS * _over(b, j):
@@ -333,21 +335,17 @@ class Interior(ABC):
         """
         chosen: list[Sample] = []
         first: Sample | None = None
-        samples, last = self.samples, 0.0
-        here, end, known = samples[start], samples[start].place, len(samples)
-        for k in range(start + way, start + 7 * way, way):
-            if not 0 <= k < known:
+        samples, parted, last = self.samples, self.steps.parted, 0.0
+        here, end = samples[start], samples[start].place
+        for beyond in samples[start + 1 : start + 7] if way > 0 else samples[max(0, start - 6) : start][::-1]:
+            if parted(beyond, here) if way < 0 else parted(here, beyond):
                 break
-            beyond = samples[k]
-            if self.steps.parted(beyond, here) if way < 0 else self.steps.parted(here, beyond):
-                break
-            if first is None:
-                first = beyond
-            distance = abs(beyond.place - end)
+            first = first or beyond
+            distance = way * (beyond.place - end)
             if distance - last > 4.0 * h:
                 break
             if distance - last > 0.1 * h:
-                chosen.append(beyond)
+                chosen += (beyond,)
                 last = distance
                 if len(chosen) == _BESIDE:
                     break

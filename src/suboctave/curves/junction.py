@@ -170,9 +170,8 @@ def regular_point(point: CurvePoint) -> CurvePoint:
 
 
 def plain_point(point: CurvePoint, before: CurvePoint | None) -> CurvePoint:
-    """A point of a curve as it is followed as one of its motions, behind the last one there."""
-    if not isinstance(point.curve, BlownUp):
-        return point
+    """A point of a curve blown up as one of its motions, behind the last one there."""
+    assert isinstance(point.curve, BlownUp)
     return point.curve.plain_point(point, 0.0) if before is None else point.curve.behind(point, before)
 
 

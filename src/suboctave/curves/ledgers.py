@@ -56,8 +56,10 @@ class CountCheck:
         self._last, self._since = sample, []
         if last is None:
             return None
+        before, now = last.outside, sample.outside
+        if before == now and not kinds:
+            return None
         odd = sum(kind in ("LP", "PD", "BP") for kind in kinds)
-        before, now = (one.outside for one in (last, sample))
         change = abs(now - before)
         # a branch that turns back at a pitchfork is its own mirror image behind it: the count does not change there
         if change <= odd + 2 * kinds.count("NS") and ("BP" in kinds or (change - odd) % 2 == 0):

@@ -137,7 +137,7 @@ class MotionEvaluation:
             return False
         return reference > 0.0 or rests_in_corner(self.state)
 
-    @lazy
+    @property
     def truncation(self) -> float:
         """Estimated size of the neglected harmonics relative to the motion."""
         return truncation(self.state)

@@ -45,14 +45,14 @@ from suboctave.harmonic.energy import action_along, action_gradient
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.orbit import PeriodicOrbit
 from suboctave.harmonic.perturbation import Kind
-from suboctave.harmonic.truncation import next_harmonics
+from suboctave.harmonic.truncation import next_harmonics, truncation
 from suboctave.lazy import lazy
 
 _MONODROMY = Monodromy()
 #: excursions across a gap: heights of its extrema, by their number
 Excursions = dict[int, float]
 #: height, in units of the largest relative displacement, up to which an excursion may end soon
-_YOUNG = 0.05
+YOUNG = 0.05
 #: height of an extremum over its gap that is rounding along a curve of grazings, in units of the motion
 _GRAZING = 1e-8
 #: odd Fourier coefficients of stiffness and damping, as a share of the largest, that are rounding
@@ -99,7 +99,7 @@ class Sample:
     def orbit(self) -> PeriodicOrbit:
         """The motion."""
         state, evaluation = self.state, self.evaluation
-        known = dict(state.values), evaluation.error, evaluation.truncation, self.curve.adaptive
+        known = dict(state.values), evaluation.error, truncation(state), self.curve.adaptive
         return PeriodicOrbit(state.balance, state.x.copy(), state.omega, *known, zeta=self.curve.zeta(evaluation.extra))
 
     # ------------------------------------------------------------------------------------------ along responses
@@ -213,8 +213,10 @@ class Sample:
         """The elements' gaps with the extrema of the motion there; what grazes all along a curve is at its gap itself:
         on which side of that is rounding.
         """
-        found, equations = gap_extrema(self.state), self.evaluation.equations.own
-        if not isinstance(equations, GrazingEquations):
+        found = gap_extrema(self.state)
+        if self.curve.augmentation is PLAIN or not isinstance(
+            equations := self.evaluation.equations.own, GrazingEquations
+        ):
             return found
         near = _GRAZING * equations.of.unit
         return tuple(
@@ -228,7 +230,7 @@ class Sample:
         # there are few extrema: numbers are quicker than arrays
         for gap in self.gaps:
             values, level, heights = gap.value.tolist(), gap.level, {}
-            most = _YOUNG * max(map(abs, values), default=0.0)
+            most = YOUNG * max(map(abs, values), default=0.0)
             for i, (value, curve) in enumerate(zip(values, gap.curve.tolist(), strict=True)):
                 height = level - value if curve > 0.0 else value - level
                 if 0.0 < height < most:
@@ -468,7 +470,7 @@ class Sample:
             mu = _without(mu, 1.0 + 0.0j, augmentation.trivial == 2)
         return _without(mu, critical, augmentation.name == "NS" or augmentation.trivial == 2)
 
-    @property
+    @lazy
     def fold(self) -> tuple[float, float]:
         """Sign and logarithm of the determinant that vanishes where another multiplier is +1."""
         return self.fold_of_cycles if self.curve.augmentation.free_phase else self.determinant(Kind.INTEGER)

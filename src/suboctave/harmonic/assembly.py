@@ -24,6 +24,7 @@ __all__ = [
     "block_diagonal",
     "evaluated",
     "galerkin",
+    "sizes_of",
     "sparse",
     "toeplitz",
 ]
@@ -39,7 +40,7 @@ def sparse(directions: Array) -> Sparse:
 
 
 _ALONE = sparse(np.ones((1, 1)))
-_NO_BLOCKS = np.zeros((0, 1, 1), dtype=complex)
+_NO_BLOCKS, _NOWHERE = np.zeros((0, 1, 1), dtype=complex), np.zeros((0, 1))
 
 
 def galerkin(stiffness: ComplexArray, damping: ComplexArray | None, rate: float, mean: bool, count: int) -> Array:
@@ -50,7 +51,7 @@ def galerkin(stiffness: ComplexArray, damping: ComplexArray | None, rate: float,
         spectra[2, 0] = damping
     size = 2 * count - (1 if mean else 0)
     out = np.zeros((size, size))
-    add_operator(out, spectra, 1, damping is not None, rate, mean, _ALONE, _ALONE, _NO_BLOCKS)
+    add_operator(out, spectra, 1, damping is not None, rate, mean, _ALONE, _ALONE, _NO_BLOCKS, _NO_BLOCKS, _NOWHERE)
     return out
 
 
@@ -63,7 +64,8 @@ def block_diagonal(blocks: ComplexArray, mean: bool) -> Array:
     """A linear operator given by its blocks, one a harmonic, in the integer (mean) or the half-odd basis."""
     rows = blocks.shape[1] * (2 * len(blocks) - (1 if mean else 0))
     out = np.zeros((rows, rows))
-    add_operator(out, np.zeros((3, 0, 1), dtype=complex), 0, False, 0.0, mean, _ALONE, _ALONE, blocks)
+    spectra = np.zeros((3, 0, 1), dtype=complex)
+    add_operator(out, spectra, 0, False, 0.0, mean, _ALONE, _ALONE, blocks, _NO_BLOCKS, _NOWHERE)
     return out
 
 
@@ -77,6 +79,30 @@ def add_displacements(x, directions, out):
             out[g, 0] += d * x[0, i]
             for h in range(1, out.shape[1]):
                 out[g, h] += complex(d * x[2 * h - 1, i], -d * x[2 * h, i])
+
+
+@kernel()
+def sizes_of(x, beyond, weight):
+    """Squares of the sizes of the harmonics in x (2 H + 1, n) and of those beyond these, complex amplitudes (K, n),
+    with weights (n,); the size of all above the k-th relative to those in x; the size of these.
+    """
+    inside = (x.shape[0] + 1) // 2
+    squares = np.zeros(inside + beyond.shape[0])
+    for i in range(x.shape[1]):
+        w = weight[i] * weight[i]
+        for r in range(x.shape[0]):
+            squares[(r + 1) // 2] += w * x[r, i] * x[r, i]
+        for k in range(beyond.shape[0]):
+            squares[inside + k] += w * (beyond[k, i].real ** 2 + beyond[k, i].imag ** 2)
+    size, left, tails = 0.0, 0.0, np.zeros(squares.shape[0])
+    for k in range(inside):
+        size += squares[k]
+    size = math.sqrt(size)
+    for k in range(squares.shape[0] - 1, 0, -1):
+        left += squares[k]
+        if size > 0.0:
+            tails[k - 1] = math.sqrt(left) / size
+    return squares, tails, size
 
 
 @kernel()
@@ -98,17 +124,14 @@ def apply_blocks(blocks, x):
 
 
 @kernel()
-def balance_residual(x, blocks, force, load, directions, weight, parts):
-    """A X, F and `R = A X + F - P` into `parts` (3, 2 H + 1, n); returns |R| and `|A X| + |F| + |P|`.
+def balance_residual(x, blocks, force, load, directions, weight):
+    """F and `R = A X + F - P`, (2 H + 1, n) each, |R| and `|A X| + |F| + |P|`.
 
     blocks (H + 1, n, n) hold A, `force` (G, top + 1) the Fourier coefficients along G directions (`sparse`). Sizes are
     weighted by `weight` per DOF.
     """
     rows, n = x.shape
-    linear, forces, residual = apply_blocks(blocks, x), parts[1], parts[2]
-    for r in range(rows):
-        for i in range(n):
-            forces[r, i] = 0.0
+    linear, forces, residual = apply_blocks(blocks, x), np.zeros(x.shape), np.empty(x.shape)
     starts, dofs, entries = directions
     for g in range(force.shape[0]):
         for s in range(starts[g], starts[g + 1]):
@@ -120,40 +143,42 @@ def balance_residual(x, blocks, force, load, directions, weight, parts):
     missing = linears = whole = loads = 0.0
     for r in range(rows):
         for i in range(n):
-            parts[0, r, i] = linear[r, i]
             residual[r, i] = linear[r, i] + forces[r, i] - load[r, i]
             w = weight[i] * weight[i]
             missing += w * residual[r, i] * residual[r, i]
             linears += w * linear[r, i] * linear[r, i]
             whole += w * forces[r, i] * forces[r, i]
             loads += w * load[r, i] * load[r, i]
-    return math.sqrt(missing), math.sqrt(linears) + math.sqrt(whole) + math.sqrt(loads)
+    return forces, residual, math.sqrt(missing), math.sqrt(linears) + math.sqrt(whole) + math.sqrt(loads)
 
 
 @kernel()
-def evaluated(x, blocks, load, directions, weight, laws, motions, table, parts):
-    """A motion at once where all laws are known in closed form (`ClosedLaws`): displacements along the directions into
-    `motions` (G, H + 1), spectra into `table` (3, G, top + 1), both zero, and what `balance_residual` gives. Returns
-    whether forces and slopes are finite.
+def evaluated(x, blocks, load, directions, weight, laws, top):
+    """A motion at once where all laws are known in closed form (`ClosedLaws`): displacements along the directions, (G,
+    H + 1), spectra (3, G, top + 1), what `balance_residual` gives, and whether forces and slopes are finite.
     """
+    groups = directions[0].shape[0] - 1
+    motions = np.zeros((groups, blocks.shape[0]), dtype=np.complex128)
+    table = np.zeros((3, groups, top + 1), dtype=np.complex128)
     add_displacements(x, directions, motions)
     add_laws(motions, laws, table)
-    size, scale = balance_residual(x, blocks, table[0], load, directions, weight, parts)
+    force, residual, size, scale = balance_residual(x, blocks, table[0], load, directions, weight)
     whole = 0.0
     # a number that is not finite at any instant is in all coefficients
     for part in range(2):
-        for g in range(table.shape[1]):
+        for g in range(groups):
             whole += abs(table[part, g, 0])
-    return math.isfinite(whole), size, scale
+    return motions, table, force, residual, size, scale, math.isfinite(whole)
 
 
 @kernel()
-def add_operator(out, spectra, groups, moving, rate, mean, outgoing, incoming, blocks):
+def add_operator(out, spectra, groups, moving, rate, mean, outgoing, incoming, blocks, slope, x):
     """Add `A + sum_g out_g [T(f_u) + T(f_v) d/dt] in_g^T`, g the first `groups` channels, in the integer (mean) or the
     half-odd basis to a real matrix.
 
     spectra (3, C, top + 1): of force, stiffness, damping; moving: whether any has damping; rate: base frequency;
-    outgoing, incoming: directions (`sparse`); blocks: A, one per harmonic, (H + 1, n, n), or none, (0, n, n).
+    outgoing, incoming: directions (`sparse`); blocks: A, one per harmonic, (H + 1, n, n), or none, (0, n, n); slope: A
+    differentiated by a parameter, likewise: what it makes of coefficients x (2 H + 1, n) is added to the last column.
     """
     n = blocks.shape[1]
     count = (out.shape[0] // n + 1) // 2
@@ -172,6 +197,11 @@ def add_operator(out, spectra, groups, moving, rate, mean, outgoing, incoming, b
                     out[at + n + i, at + n + j] += p
                     out[at + i, at + n + j] += q
                     out[at + n + i, at + j] -= q
+    if slope.shape[0] > 0:
+        along = apply_blocks(slope, x)
+        for r in range(along.shape[0]):
+            for i in range(n):
+                out[r * n + i, out.shape[1] - 1] += along[r, i]
     high = spectra.shape[2] - 1
     both, lines = np.empty((4, 2 * high + 1)), np.empty((2, count, 2))
     for g in range(groups):

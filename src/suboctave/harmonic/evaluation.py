@@ -10,8 +10,8 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 
@@ -29,6 +29,7 @@ from suboctave.harmonic.assembly import (
     balance_residual,
     block_diagonal,
     evaluated,
+    sizes_of,
     sparse,
     toeplitz,
 )
@@ -108,7 +109,8 @@ class HarmonicBalance(Equations):
         return self.with_samples(tuple(samples))
 
 
-class Balanced(NamedTuple):
+@dataclass(eq=False, slots=True)
+class Balanced:
     """Element forces F and residual R, (2 H + 1, size) each; the size of R, and of the forces that balance, `|A X| +
     |F| + |P|`, with residual weights: residuals are held against it.
     """
@@ -159,27 +161,31 @@ class BalanceState:
         """See `LoadSpectrum.waves`."""
         return self.balance.loads.waves({**self.values, "omega": self.omega})
 
-    @lazy
-    def _at_once(self) -> tuple[ComplexArray, ComplexArray, Balanced] | None:
-        """Displacements, spectra, and what balances, where all laws are known in closed form; else None."""
-        balance, packed, high = self.balance, self.packed, self.basis.harmonics
+    def _at_once(self) -> bool:
+        """Have displacements, spectra, and what balances in one call, where all laws are known in closed form, and say
+        whether they are.
+        """
+        balance, packed = self.balance, self.packed
         if balance.own or not packed.whole:
-            return None
-        groups, laws = len(balance.groups), packed.closed(high, balance.top)
-        motions, table = np.zeros((groups, high + 1), dtype=complex), np.zeros((3, groups, balance.top + 1), complex)
-        parts, weight = np.empty((3, *self.x.shape)), balance.scales[1]
-        finite, size, scale = evaluated(
-            self.x, self.blocks, self.load, balance.directions, weight, laws, motions, table, parts
+            return False
+        known, top = self.__dict__, balance.top
+        laws, load = packed.closed(self.basis.harmonics, top), balance.load(self.values, self.omega, self._loaded)
+        blocks = self.linear.stiffness(self.frequencies)
+        known["blocks"], known["load"] = blocks, load
+        motions, table, force, residual, size, scale, finite = evaluated(
+            self.x, blocks, load, balance.directions, balance.scales[1], laws, top
         )
         if not finite:
             self._all_finite(table)
-        return motions, table, Balanced(parts[1], parts[2], size, scale)
+        known["motions"], known["_spectra"], known["balanced"] = motions, table, Balanced(force, residual, size, scale)
+        return True
 
     @lazy
     def motions(self) -> ComplexArray:
         """Complex coefficients of the displacement along each group's direction, (G, H + 1)."""
-        known = self._at_once
-        return self._displacements(self.balance.directions, len(self.balance.groups)) if known is None else known[0]
+        if self._at_once():
+            return self.motions
+        return self._displacements(self.balance.directions, len(self.balance.groups))
 
     @lazy
     def nodes(self) -> list[Nodes]:
@@ -235,9 +241,8 @@ class BalanceState:
         """Spectra of force, stiffness and damping along all channels, (3, C, top + 1); of elements with channels of
         their own the force alone.
         """
-        known = self._at_once
-        if known is not None:
-            return known[1]
+        if self._at_once():
+            return self._spectra
         balance, packed, motions = self.balance, self.packed, self.motions
         table = np.zeros((3, len(balance.all_groups), balance.top + 1), dtype=complex)
         add_laws(motions, packed.closed(self.basis.harmonics, balance.top), table)
@@ -288,13 +293,11 @@ class BalanceState:
     @lazy
     def balanced(self) -> Balanced:
         """What balances: see `Balanced`."""
-        known = self._at_once
-        if known is not None:
-            return known[2]
+        if self._at_once():
+            return self.balanced
         balance = self.balance
-        parts, weight = np.empty((3, *self.x.shape)), balance.scales[1]
-        sizes = balance_residual(self.x, self.blocks, self._spectra[0], self.load, balance.directions, weight, parts)
-        return Balanced(parts[1], parts[2], *sizes)
+        force, directions, weight = self._spectra[0], balance.directions, balance.scales[1]
+        return Balanced(*balance_residual(self.x, self.blocks, force, self.load, directions, weight))
 
     def same_law(self, channel: Channel, one: ComplexArray, other: ComplexArray) -> bool:
         """Whether two spectra of a law's force and slopes (1 + Q, top + 1) differ by what matters nowhere.
@@ -340,44 +343,43 @@ class BalanceState:
     @lazy
     def force_jacobian(self) -> Array:
         """dF/dX for all harmonics up to H, square, with size (2 H + 1) rows."""
-        return self._add_tangent(np.zeros((self.x.size, self.x.size)), self.blocks[:0], mean=True)
+        return self._add_tangent(np.zeros((self.x.size, self.x.size)), self.blocks[:0])
 
-    def _add_tangent(self, out: Array, blocks: ComplexArray, mean: bool) -> Array:
+    def _add_tangent(
+        self, out: Array, blocks: ComplexArray, mean: bool = True, slope: ComplexArray | None = None
+    ) -> Array:
         """Add the Galerkin matrix of the tangent in the integer (mean=True) or the half-odd basis, and linear blocks
-        (H + 1, size, size) or none, to `out`.
+        (H + 1, size, size) or none, to `out`; and to its last column what blocks of their derivative make of X.
         """
-        balance = self.balance
-        at, groups = balance.directions, len(balance.groups)
-        add_operator(out, self._spectra, groups, balance.any_moving, self.rate, mean, at, at, blocks)
-        for channel in self.own_channels:
+        balance, none = self.balance, blocks[:0]
+        at, groups, by = balance.directions, len(balance.groups), none if slope is None else slope
+        add_operator(out, self._spectra, groups, balance.any_moving, self.rate, mean, at, at, blocks, by, self.x)
+        for channel in self.own_channels if balance.own else ():
             q = channel.spectra[1:].reshape(-1, channel.count, balance.top + 1)
             # one input after the other, each with the force along the same direction
             spectra = np.zeros((3, *q.shape[1:]), dtype=complex)
             spectra[1 : 1 + len(q)] = q
             outgoing = sparse(np.tile(channel.out, (channel.count, 1)))
-            moving, none = channel.moving, blocks[:0]
-            add_operator(out, spectra, channel.count, moving, self.rate, mean, outgoing, sparse(channel.ins), none)
+            moving, incoming = channel.moving, sparse(channel.ins)
+            add_operator(out, spectra, channel.count, moving, self.rate, mean, outgoing, incoming, none, none, self.x)
         return out
 
     @lazy
     def jacobian(self) -> Array:
         """R_X, shape (dimension, dimension)."""
-        return self._add_tangent(np.zeros((self.x.size, self.x.size)), self.blocks, mean=True)
+        return self._add_tangent(np.zeros((self.x.size, self.x.size)), self.blocks)
 
     def low_jacobian(self, harmonics: int) -> Array:
         """R_X between the harmonics up to some alone, square, with `size (2 harmonics + 1)` rows."""
         rows = self.balance.size * (2 * harmonics + 1)
-        return self._add_tangent(np.zeros((rows, rows)), self.blocks[: harmonics + 1], mean=True)
+        return self._add_tangent(np.zeros((rows, rows)), self.blocks[: harmonics + 1])
 
     def extended_jacobian(self, name: str) -> Array:
         """`[R_X R_name]`, shape (dimension, dimension + 1); name is "omega" or a parameter."""
-        m = self.x.size
-        out = np.zeros((m, m + 1))
-        if "jacobian" in vars(self):
-            out[:, :-1] = self.jacobian
-        else:
-            out = self._add_tangent(out, self.blocks, mean=True)
-        out[:, -1] = self.residual_by(name)
+        m, change = self.x.size, self.unbalanced_by(name)
+        out = self._add_tangent(np.zeros((m, m + 1)), self.blocks, slope=self.linear_by(name))
+        if change is not None:
+            out[:, -1] += change.ravel()
         return out
 
     @lazy
@@ -486,23 +488,20 @@ class BalanceState:
             response = _response(self.linear.stiffness((1.0 + _ASIDE) * frequencies), force)
         return np.zeros_like(force) if response is None else response
 
-    @lazy
+    @property
     def squares(self) -> Array:
         """Squares of the sizes of the harmonics 0 .. 2 H + 1, with the weights of displacements (`scales`)."""
-        weight = self.balance.scales[0] ** 2
-        rows, lacking = (self.x * self.x) @ weight, self.neglected
-        beyond = (lacking.real**2 + lacking.imag**2) @ weight
-        return np.concatenate((rows[:1], rows[1::2] + rows[2::2], beyond))
+        return self._sizes[0]
 
-    @lazy
+    @property
     def tails(self) -> tuple[Array, float]:
         """Size of all harmonics above k relative to the motion, k = 0 .. 2 H + 1, and the motion's size."""
-        squares = self.squares
-        size = math.sqrt(squares[: self.basis.harmonics + 1].sum())
-        tail = np.zeros(len(squares))
-        if size > 0.0:
-            tail[:-1] = np.sqrt(squares[:0:-1].cumsum()[::-1]) / size
-        return tail, size
+        return self._sizes[1:]
+
+    @lazy
+    def _sizes(self) -> tuple[Array, Array, float]:
+        sizes: tuple[Array, Array, float] = sizes_of(self.x, self.neglected, self.balance.scales[0])
+        return sizes
 
     @lazy
     def completed(self) -> BalanceState:
@@ -529,7 +528,7 @@ _ASIDE = 1e-8
 def _response(blocks: ComplexArray, force: ComplexArray) -> ComplexArray | None:
     """A^-1 f for matrices (F, n, n) and forces (F, n); None where one is singular."""
     if blocks.shape[-1] == 1:
-        return force / blocks[:, :, 0] if blocks.all() else None
+        return None if 0.0 in blocks else force / blocks[:, :, 0]
     try:
         return np.asarray(np.linalg.solve(blocks, force[:, :, None])[:, :, 0], dtype=complex)
     except np.linalg.LinAlgError:

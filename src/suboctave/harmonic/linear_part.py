@@ -163,19 +163,12 @@ class StructuralMatrices(EquationOfMotion):
 
     def stiffness(self, frequency: NDArray[Any], order: int = 0) -> ComplexArray:
         """See `LinearPart.stiffness`."""
-        out: ComplexArray = np.empty((frequency.size, self.size * self.size), dtype=complex)
-        dynamic_stiffness(self._entries, frequency, order, out)
-        return out.reshape(-1, self.size, self.size)
-
-    @lazy
-    def _entries(self) -> Array:
-        """The same matrices, with all entries of each in a row."""
-        return self.matrices.reshape(4, -1)
+        return dynamic_stiffness(self.matrices, frequency, order)
 
     def stiffness_by(self, frequency: Array, names: tuple[str, ...], order: int = 0) -> ComplexArray | None:
         """See `LinearPart.stiffness_by`."""
         parts = differentiated(self.system.linear_parts, names, self.values)
-        return None if parts is None else _blocks(parts, frequency, order)
+        return None if parts is None else dynamic_stiffness(parts, frequency, order)
 
     def retain(self, direction: Array) -> Array:
         """All DOFs are unknowns."""
@@ -221,13 +214,12 @@ class StructuralMatrices(EquationOfMotion):
         """See `LinearPart.fed`."""
         other = copy.copy(self)
         other.matrices = fed_matrices(self.matrices, rate)
-        for made in ("_equation", "_entries"):
-            vars(other).pop(made, None)
+        vars(other).pop("_equation", None)
         return other
 
     def feeding(self, frequency: Array) -> ComplexArray:
         """See `LinearPart.feeding`."""
-        return _blocks(feeding_matrices(self.matrices), frequency, 0)
+        return dynamic_stiffness(feeding_matrices(self.matrices), frequency, 0)
 
 
 def fed_matrices(matrices: NDArray[Any], rate: float) -> NDArray[Any]:
@@ -291,19 +283,6 @@ def differentiated(
     return np.array([np.zeros((n, n)) if one is None else one.value(values) for one in found])
 
 
-def _blocks(matrices: Array, frequency: NDArray[Any], order: int) -> ComplexArray:
-    """The dynamic stiffness at the frequencies, or its first or second derivative by Omega; (F, n, n)."""
-    count, n, _ = matrices.shape
-    return entries_at(matrices.reshape(count, n * n), frequency, order).reshape(-1, n, n)
-
-
-def entries_at(entries: Array, frequency: NDArray[Any], order: int) -> ComplexArray:
-    """The same from all entries of M, C, K, S in rows, (4, .); (F, .)."""
-    out = np.empty((len(frequency), entries.shape[1]), dtype=complex)
-    dynamic_stiffness(entries, frequency, order, out)
-    return out
-
-
 @kernel()
 def factors(w, order):
     """What M, C, K, S are multiplied by in the dynamic stiffness at w, complex, or in its derivative by Omega."""
@@ -313,11 +292,15 @@ def factors(w, order):
 
 
 @kernel()
-def dynamic_stiffness(entries, frequency, order, out):
-    """`K - Omega^2 M + i Omega C + i sgn(Re Omega) S` into `out` (F, .), or its first or second derivative by Omega,
-    complex or real; entries (4, .): M, C, K, S.
+def dynamic_stiffness(matrices, frequency, order):
+    """`K - Omega^2 M + i Omega C + i sgn(Re Omega) S`, (F, n, n), or its first or second derivative by Omega; matrices
+    (4, n, n): M, C, K, S.
     """
+    out = np.empty((frequency.shape[0], matrices.shape[1], matrices.shape[2]), dtype=np.complex128)
     for f in range(frequency.shape[0]):
         by = factors(complex(frequency[f]), order)
-        for i in range(entries.shape[1]):
-            out[f, i] = by[0] * entries[0, i] + by[1] * entries[1, i] + by[2] * entries[2, i] + by[3] * entries[3, i]
+        for i in range(matrices.shape[1]):
+            for j in range(matrices.shape[2]):
+                total = by[0] * matrices[0, i, j] + by[1] * matrices[1, i, j]
+                out[f, i, j] = total + by[2] * matrices[2, i, j] + by[3] * matrices[3, i, j]
+    return out

@@ -313,19 +313,32 @@ def passages(ta, xa, sa, level_a, tb, xb, sb, level_b):
     """Extrema that pass a level between two neighbouring motions a and b (instants t, values x, curvatures s).
 
     Extrema are paired in their cyclic order, so that two that pass at once in opposite senses are both seen. Returns
-    all pairs of indices, those that pass first, shape (m, 2), how many do, and how often each motion crosses its level.
+    all pairs of indices, those that pass first, shape (m, 2), how many do, how often each motion crosses its level, and
+    the least height of an extremum across it, in units of the motion's largest value.
     If the crossings differ by other than what the pairs explain, extrema have come or gone as well.
     """
     crossed_a = crossed_b = 0
-    for i in range(xa.shape[0]):
-        crossed_a += (xa[i] > level_a) != (xa[(i + 1) % xa.shape[0]] > level_a)
-    for i in range(xb.shape[0]):
-        crossed_b += (xb[i] > level_b) != (xb[(i + 1) % xb.shape[0]] > level_b)
+    least = np.inf
+    for side in range(2):
+        x, s, level = (xa, sa, level_a) if side == 0 else (xb, sb, level_b)
+        crossed, largest, lowest = 0, 0.0, np.inf
+        for i in range(x.shape[0]):
+            crossed += (x[i] > level) != (x[(i + 1) % x.shape[0]] > level)
+            largest = max(largest, abs(x[i]))
+            height = level - x[i] if s[i] > 0.0 else x[i] - level
+            if height > 0.0:
+                lowest = min(lowest, height)
+        if lowest < np.inf and largest > 0.0:
+            least = min(least, lowest / largest)
+        if side == 0:
+            crossed_a = crossed
+        else:
+            crossed_b = crossed
     wanted = min(xa.shape[0], xb.shape[0])
     pairs = np.empty((wanted, 2), dtype=np.int64)
     count = 0
     if wanted == 0:
-        return pairs, count, crossed_a, crossed_b
+        return pairs, count, crossed_a, crossed_b, least
     kept = np.empty((2, max(xa.shape[0], xb.shape[0])), dtype=np.int64)
     for side in range(2):
         # neighbouring pairs are dropped, the least different first: ripples that have just come or are about to go
@@ -335,11 +348,11 @@ def passages(ta, xa, sa, level_a, tb, xb, sb, level_b):
             index[i] = i
         while m > wanted:
             best = 0
-            least = np.inf
+            smallest = np.inf
             for i in range(m):
                 difference = abs(x[index[i]] - x[index[(i + 1) % m]])
-                if difference < least:
-                    least = difference
+                if difference < smallest:
+                    smallest = difference
                     best = i
             other, left = (best + 1) % m, 0
             for i in range(m):
@@ -351,14 +364,14 @@ def passages(ta, xa, sa, level_a, tb, xb, sb, level_b):
     # maxima to maxima
     first = 0 if (sa[ia[0]] < 0.0) == (sb[ib[0]] < 0.0) else 1
     best = first
-    least = np.inf
+    shortest = np.inf
     for shift in range(first, wanted, 2):
         total = 0.0
         for i in range(wanted):
             way = abs(ta[ia[i]] - tb[ib[(i + shift) % wanted]])
             total += min(way, 2.0 * math.pi - way)
-        if total < least:
-            least = total
+        if total < shortest:
+            shortest = total
             best = shift
     last = wanted
     for i in range(wanted):
@@ -372,4 +385,4 @@ def passages(ta, xa, sa, level_a, tb, xb, sb, level_b):
             at = last
         pairs[at, 0] = p
         pairs[at, 1] = q
-    return pairs, count, crossed_a, crossed_b
+    return pairs, count, crossed_a, crossed_b, least

@@ -145,7 +145,7 @@ def touches(a: Sample, b: Sample) -> tuple[list[Touch], bool]:
     """Extrema that pass a gap between two neighbours, and whether they explain the numbers of crossings there."""
     passing, clear = [], True
     for p, q in zip(a.gaps, b.gaps, strict=True):
-        pairs, count, before, after = passages(p.tau, p.value, p.curve, p.level, q.tau, q.value, q.curve, q.level)
+        pairs, count, before, after, _ = passages(p.tau, p.value, p.curve, p.level, q.tau, q.value, q.curve, q.level)
         if before == after and not count:
             continue
         explained = 0
