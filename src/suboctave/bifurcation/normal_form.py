@@ -49,7 +49,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -62,6 +61,7 @@ from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.perturbation import Kind, bilinear_gradient, operator
 from suboctave.harmonic.trigonometric import wave_sums
 from suboctave.harmonic.waves import Frequencies, Waves
+from suboctave.lazy import lazy
 
 #: share of the terms that add up to it below which a number counts as zero whatever its estimated error
 _ROUNDING = 1e-9
@@ -172,7 +172,7 @@ class Expansion:
         forms = Multilinear(state)
         return cls(state, kind, phi, turn * psi, turn * g, size, turn * slope.x, by_parameter, by_omega, forms)
 
-    @cached_property
+    @lazy
     def waves(self) -> Waves:
         """phi as waves."""
         return Waves.of(self.state, self.kind, self.phi)

@@ -86,17 +86,18 @@ class Bracket:
         low, high = (self.points[s] for s in shares)
         part = (share - shares[0]) / (shares[1] - shares[0])
         arclength = a.arclength + share * (b.arclength - a.arclength)
-        ahead, patient = self._row / weights, replace(self.newton, iterations=30, damped=True)
+        ahead, close = self._row / weights, closely(self.newton)
         interpolated = between(low, high, part), ahead
         # along a corner of the equations, near a grazing, neighbours may lie on both sides of it
         beside = [(curve.transfer(p.u, p.curve), curve.transfer(p.tangent, p.curve)) for p in (low, high)]
         starts = [interpolated, *(beside if part <= 0.5 else beside[::-1]), interpolated]
         failure = ConvergenceError()
         # beside a corner the last digits tell on which side of it a point lies
-        for (u, along), options in zip(starts, (*[closely(self.newton)] * 3, patient), strict=True):
+        for (u, along), options in zip(starts, (close, close, close, None), strict=True):
             missing = place - float(self._row @ (weights * u))
             guess = u + missing / float(self._row @ (weights * along)) * along
             try:
+                options = options or replace(self.newton, iterations=30, damped=True)
                 solved = correct(curve, guess, self._row, weights, options)
             except ConvergenceError as error:
                 failure = error

@@ -115,8 +115,7 @@ class Factor:
     @property
     def log_determinant(self) -> float:
         """Natural logarithm of the determinant's modulus."""
-        with np.errstate(divide="ignore"):
-            return float(np.log(np.abs(self.lu.diagonal())).sum())
+        return -math.inf if self.singular else float(np.add.reduce(np.log(np.abs(self.lu.diagonal()))))
 
 
 class LeadingBlock:

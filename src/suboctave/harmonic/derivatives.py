@@ -170,6 +170,8 @@ class Multilinear:
 
     def __init__(self, state: BalanceState) -> None:
         self.state = state
+        #: waves and instants with the changes of q there, by channel, wave and instants
+        self._known: dict[tuple[int, int, int], tuple[Waves, Array, ComplexArray]] = {}
 
     def second(self, a: Waves, b: Waves, out: Frequencies) -> Waves:
         """R''[a, b] at the frequencies `out`."""
@@ -177,7 +179,7 @@ class Multilinear:
         total = np.zeros((out.count, self.state.balance.size), dtype=complex)
         for channel in self.state.channels:
             for zr, zi, weights in channel.second:
-                values = self._all_values(channel, (a, b), zr, zi)
+                values = [self.values(channel, one, zr, zi) for one in (a, b)]
                 products = np.einsum("rsn,rn,sn->n", weights, *values)
                 total += np.multiply.outer(_project(products, zr, zi, shift, out.count), channel.out)
         return Waves(total, out)
@@ -188,11 +190,11 @@ class Multilinear:
         total = np.zeros((out.count, self.state.balance.size), dtype=complex)
         for channel in self.state.channels:
             for zr, zi, weights, corners in channel.third:
-                values = self._all_values(channel, (a, b, c), zr, zi)
+                values = [self.values(channel, one, zr, zi) for one in (a, b, c)]
                 plain = _trilinear(weights, *values)
                 spectrum = np.zeros(out.count, dtype=complex)
                 if corners is not None:
-                    slopes = self._all_values(channel, (a.slope, b.slope, c.slope), zr, zi)
+                    slopes = [self.values(channel, one.slope, zr, zi) for one in (a, b, c)]
                     x, y, z = values
                     plain = plain + _trilinear(corners, slopes[0], y, z)
                     plain += _trilinear(corners, x, slopes[1], z) + _trilinear(corners, x, y, slopes[2])
@@ -202,18 +204,17 @@ class Multilinear:
                 total += np.multiply.outer(spectrum, channel.out)
         return Waves(total, out)
 
-    def _all_values(self, channel: Channel, waves: tuple[Waves, ...], zr: Array, zi: Array) -> list[ComplexArray]:
-        """Changes of q along perturbations at instants, (Q, N) each; the same wave is evaluated once."""
-        values = {key: self.values(channel, one, zr, zi) for key, one in {id(one): one for one in waves}.items()}
-        return [values[id(one)] for one in waves]
-
     def values(self, channel: Channel, a: Waves, zr: Array, zi: Array) -> ComplexArray:
-        """Change of q along a perturbation at instants, (Q, N), without the factor of its lowest wave."""
-        rows = (a.amplitudes @ channel.ins.T).T
-        if channel.moving:
-            rows = np.concatenate((rows, 1j * self.state.rate * a.at.values * rows))
-        values: ComplexArray = wave_sums(np.ascontiguousarray(rows), zr, zi)
-        return values
+        """Change of q along a perturbation at the instants of a channel, (Q, N), without the factor of its lowest wave;
+        the same wave is evaluated once.
+        """
+        key = id(channel), id(a), id(zr)
+        if key not in self._known:
+            rows = (a.amplitudes @ channel.ins.T).T
+            if channel.moving:
+                rows = np.concatenate((rows, 1j * self.state.rate * a.at.values * rows))
+            self._known[key] = a, zr, wave_sums(rows, zr, zi)
+        return self._known[key][2]
 
 
 def _trilinear(weights: Array, a: ComplexArray, b: ComplexArray, c: ComplexArray) -> ComplexArray:

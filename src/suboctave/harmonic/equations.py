@@ -36,14 +36,17 @@ _Same = TypeVar("_Same", bound="Equations")
 class Laws:
     """The laws of all elements at parameter values: one by one, and those of every group of one displacement."""
 
-    def __init__(self, members: list[Member], groups: list[Group]) -> None:
+    def __init__(self, members: list[Member], groups: list[Group], like: Laws | None = None) -> None:
         self.members = members
         self.groups = [[members[i] for i in group.members] for group in groups]
+        #: laws of the same kinds with other coefficients
+        self._like = like
 
     @lazy
     def packed(self) -> PackedLaws:
         """The groups' laws that are known in closed form, as arrays."""
-        return PackedLaws(self.groups)
+        like, self._like = self._like, None
+        return PackedLaws(self.groups) if like is None else like.packed.moved(self.groups)
 
     @lazy
     def levels(self) -> list[list[tuple[int, int, float]]]:
@@ -208,18 +211,19 @@ class Equations:
         """
         own = values is self.values
         key = None if own else tuple([values[name] for name in self._all_names])
-        kept = self._laws.get(own)
-        if kept is not None and kept[0] == key:
-            return kept[1]
-        members = []
+        if own in self._laws and self._laws[own][0] == key:
+            return self._laws[own][1]
+        members: list[Member] = []
+        like = self._laws[False][1] if False in self._laws else None
         for i, element in enumerate(self.system.elements):
             at = tuple([values[name] for name in self._names[i]])
-            cached = self._members.get(i)
-            if cached is None or cached[0] != at:
+            if i not in self._members or self._members[i][0] != at:
                 c = element.coefficient_values(values)
-                cached = self._members[i] = at, Member(i, element, element.sampling(c), c, self.samples[i])
-            members.append(cached[1])
-        self._laws[own] = key, Laws(members, self.groups)
+                self._members[i] = at, Member(i, element, element.sampling(c), c, self.samples[i])
+            member = self._members[i][1]
+            members += (member,)
+            like = None if like is None or like.members[i].kind is not member.kind else like
+        self._laws[own] = key, Laws(members, self.groups, like)
         return self._laws[own][1]
 
     @lazy

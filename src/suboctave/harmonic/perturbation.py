@@ -109,7 +109,7 @@ class _Form:
     def by_frequency(self) -> ComplexArray:
         """Derivatives by the frequency of every wave, (F,)."""
         linear = self.state.linear
-        total = np.sum(self.u.conj() * _per_wave(linear.stiffness(self.frequency, 1), self.v), axis=1)
+        total = np.add.reduce(self.u.conj() * _per_wave(linear.stiffness(self.frequency, 1), self.v), axis=1)
         for channel in self.state.channels:
             for i, d in enumerate(channel.ins if channel.moving else ()):
                 pulled = applied(channel.damping(i)[None], (self.u @ channel.out)[None])

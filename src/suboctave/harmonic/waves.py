@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from suboctave.harmonic.basis import Array, ComplexArray
 from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.trigonometric import spectra
+from suboctave.lazy import lazy
 
 __all__ = ["Frequencies", "Kind", "Waves", "fourier"]
 
@@ -45,7 +46,7 @@ class Frequencies:
             return _frequencies(-high - 0.5, 2 * high + 2)
         return _frequencies(-high + (kappa / state.rate if kind is Kind.FREE else 0.0), 2 * high + 1)
 
-    @cached_property
+    @lazy
     def values(self) -> NDArray[Any]:
         """All of them, shape (count,)."""
         values: NDArray[Any] = self.lowest + np.arange(self.count, dtype=float)
@@ -74,12 +75,12 @@ class Waves:
         shaped = vector.reshape(-1, state.balance.size)
         return cls(as_waves(shaped, kind, left), Frequencies.of(state, kind, kappa))
 
-    @cached_property
+    @lazy
     def conjugate(self) -> Waves:
         """The complex conjugate as a function of time."""
         return Waves(self.amplitudes[::-1].conj(), Frequencies(-self.at.values[-1], self.at.count))
 
-    @cached_property
+    @lazy
     def slope(self) -> Waves:
         """The derivative with respect to tau."""
         return Waves(1j * self.at.values[:, None] * self.amplitudes, self.at)

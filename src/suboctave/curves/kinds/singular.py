@@ -21,8 +21,7 @@ from suboctave.harmonic.evaluation import BalanceState
 from suboctave.harmonic.perturbation import Kind, rate_by_kappa
 from suboctave.lazy import lazy
 
-_NAMES = {Kind.INTEGER: "LP", Kind.HALF: "PD", Kind.FREE: "NS"}
-OPERATORS = {name: kind for kind, name in _NAMES.items()} | {"Hopf": Kind.FREE}
+OPERATORS = {"LP": Kind.INTEGER, "PD": Kind.HALF, "NS": Kind.FREE, "Hopf": Kind.FREE}
 
 
 @dataclass(frozen=True)
@@ -61,7 +60,7 @@ class SingularOperator(Augmentation):
     @property
     def name(self) -> str:
         """Kind of bifurcation."""
-        return _NAMES[self.kind]
+        return "LP" if self.kind is Kind.INTEGER else "PD" if self.kind is Kind.HALF else "NS"
 
     @property
     def extras(self) -> int:
@@ -120,7 +119,7 @@ class SingularEquations(Equations):
     def rows(self) -> Array:
         by_x, rates, by_kappa = self.gradient
         if self.of.kind is not Kind.FREE:
-            return np.append(by_x.real, [rates[name].real for name in self.names])[None] / self.of.unit
+            return np.concatenate((by_x.real, [rates[name].real for name in self.names]))[None] / self.of.unit
         whole = np.concatenate((by_x, [by_kappa], [rates[name] for name in self.names])) / self.of.unit
         return np.array([whole.real, whole.imag])
 

@@ -104,7 +104,7 @@ class Channel:
     def second(self) -> list[Second]:
         """Second derivatives."""
         parts = [part for law in self.laws for part in law.second() if len(part.zr)]
-        return [part._replace(weights=self._widened(part.weights, 2)) for part in parts]
+        return [Second(zr, zi, self._widened(weights, 2)) for zr, zi, weights in parts]
 
     @lazy
     def third(self) -> list[Third]:

@@ -93,8 +93,7 @@ class PackedLaws:
             for member in members:
                 kind = member.kind
                 if isinstance(kind, PiecewiseLinear):
-                    own = member.coefficients.tolist()
-                    pieces += [(own[piece.stiffness], own[piece.gap], float(piece.side)) for piece in kind.pieces]
+                    pieces += _pieces([[member]])
                 elif isinstance(kind, PolynomialSampling) and kind.coefficients is not None:
                     polynomial = [sum(pair) for pair in zip_longest(polynomial, kind.coefficients, fillvalue=0.0)]
                 elif isinstance(kind, SharpSampling):
@@ -143,16 +142,24 @@ class PackedLaws:
             if len(rows := self.steps[low:high])
         ]
 
+    def moved(self, groups: Sequence[Sequence[Member]]) -> PackedLaws:
+        """The same kinds of laws with other coefficients: those of pieces are all that are not told by the kinds."""
+        other = object.__new__(PackedLaws)
+        other.__dict__.update(self.__dict__)
+        rows = _pieces(groups)
+        other.pieces = np.array(rows) if rows else NO_ROWS
+        other._closed = {key: ClosedLaws(other.pieces, *known[1:]) for key, known in self._closed.items()}
+        return other
+
     def nodes(self, motions: ComplexArray, top: int) -> list[Nodes]:
         """Nodes for every smooth law along motions (G, H + 1), good for Fourier coefficients up to `top`."""
         return [_nodes(motions[g], polynomial, sharp, top) for g, polynomial, _, sharp in self._smooth]
 
     def closed(self, high: int, top: int) -> ClosedLaws:
         """The laws known in closed form along motions of harmonics up to `high`, for Fourier coefficients to `top`."""
-        known = self._closed.get((high, top))
-        if known is None:
-            known = self._closed[high, top] = self._closed_laws(high, top)
-        return known
+        if (high, top) not in self._closed:
+            self._closed[high, top] = self._closed_laws(high, top)
+        return self._closed[high, top]
 
     def _closed_laws(self, high: int, top: int) -> ClosedLaws:
         smooth = self._smooth
@@ -182,6 +189,18 @@ class PackedLaws:
         """Those of the arctan steps in a direction, None without any."""
         steps = (at for (g, _, steps, _), at in zip(self._smooth, nodes, strict=True) if g == direction and len(steps))
         return next(steps, None)
+
+
+def _pieces(groups: Sequence[Sequence[Member]]) -> list[tuple[float, ...]]:
+    """Stiffness, gap and side of all pieces of laws that are piecewise linear."""
+    rows: list[tuple[float, ...]] = []
+    for members in groups:
+        for _, _, kind, coefficients, _ in members:
+            if isinstance(kind, PiecewiseLinear):
+                own = coefficients.tolist()
+                for piece in kind.pieces:
+                    rows += ((own[piece.stiffness], own[piece.gap], float(piece.side)),)
+    return rows
 
 
 def _nodes(motion: ComplexArray, polynomial: Array, sharp: tuple[Array, Array] | None, top: int) -> Nodes:

@@ -118,6 +118,10 @@ class _Stops(DeclaredElement):
         """Piecewise linear, or sharp at the gaps with width 1/s."""
         if self.regularised:
             return _arctan_steps(self.sides, tuple(c.tolist()))
+        return self._pieces
+
+    @cached_property
+    def _pieces(self) -> PiecewiseLinear:
         return PiecewiseLinear(tuple(Piece(0, gap, side) for gap, side in enumerate(self.sides, start=1)))
 
     @cached_property
