@@ -58,7 +58,7 @@ from suboctave.readings import (
 
 Given = TypeVar("Given")
 _PACKAGE = "suboctave."
-_LENGTH = len(_PACKAGE)
+_LENGTH, _REPLACE = len(_PACKAGE), vars(dataclasses)
 #: the largest count of anything
 _MOST = 100_000_000
 #: names of keywords that a message lists
@@ -308,8 +308,12 @@ def _compared(function: Any, owner: type | None, checks: Checks) -> Any:
     @functools.wraps(function)
     def compared(*positional: Any, **named: Any) -> Any:
         nonlocal table
-        if inside and sys._getframe(1).f_globals.get("__name__", "")[:_LENGTH] == _PACKAGE:
-            return function(*positional, **named)
+        if inside:
+            frame = sys._getframe(1)
+            # `dataclasses.replace` makes what its caller asks for
+            frame = frame.f_back or frame if frame.f_globals is _REPLACE else frame
+            if frame.f_globals.get("__name__", "")[:_LENGTH] == _PACKAGE:
+                return function(*positional, **named)
         if table is None:
             table = _Table(function, owner, checks)
         try:

@@ -70,6 +70,28 @@ def cosine(a, b, weights):
     return np.dot(one, other) / math.sqrt(np.dot(one, one) * np.dot(other, other))
 
 
+@kernel(error_model="python")
+def course(a, b, way, weights):
+    """How a curve runs along a way with the tangents a and b at its ends, in scaled variables: the angle between these,
+    radians; its squared sine where they meet beyond the end, -1 elsewhere; the distance between the unit vector along
+    the way and the mean of theirs, 0 where the way is none.
+    """
+    turn = cosine(a, b, weights)
+    first, last, chord = np.empty(len(a)), np.empty(len(a)), np.empty(len(a))
+    for i in range(len(a)):
+        first[i], last[i], chord[i] = weights[i] * a[i], weights[i] * b[i], weights[i] * way[i]
+    sizes = math.sqrt(np.dot(first, first)), math.sqrt(np.dot(last, last)), math.sqrt(np.dot(chord, chord))
+    apart = 0.0
+    for i in range(len(a)):
+        first[i], last[i] = first[i] / sizes[0], last[i] / sizes[1]
+        if sizes[2] > 0.0:
+            apart += (chord[i] / sizes[2] - 0.5 * (first[i] + last[i])) ** 2
+    cosine_between = np.dot(first, last)
+    overshot = np.dot(chord, last) < cosine_between * np.dot(chord, first)
+    beyond = 1.0 - cosine_between**2 if overshot else -1.0
+    return math.acos(min(1.0, max(-1.0, turn))), beyond, math.sqrt(apart)
+
+
 @kernel()
 def _sign(lu, pivots):
     """Sign of a determinant, from LU factors that are not singular."""

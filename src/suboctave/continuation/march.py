@@ -20,9 +20,9 @@ from suboctave.arguments import Count, Positive, checked
 from suboctave.compiled import kernel
 from suboctave.continuation.bounds import Bounds, Range
 from suboctave.continuation.ending import Ending, EndReason
-from suboctave.continuation.linear import cosine, distance, length
+from suboctave.continuation.linear import distance, length
 from suboctave.continuation.newton import NewtonOptions, Solved, closely, correct
-from suboctave.continuation.point import CurvePoint, between, make_point, solved_again
+from suboctave.continuation.point import CurvePoint, between, course_between, make_point, solved_again
 from suboctave.continuation.problem import Array, Curve, Evaluation
 from suboctave.errors import ConvergenceError, InputError, NotFiniteError
 
@@ -101,12 +101,12 @@ class Place:
         #: its images in the discretisation of the last point
         self._images: tuple[Curve, list[Array]] | None = None
 
-    def near(self, point: CurvePoint, new: CurvePoint) -> bool:
-        """Whether the step from `point` to `new` may pass it, as far as the parameter tells."""
+    def near(self, new: CurvePoint, reach: float) -> bool:
+        """Whether it may lie within a reach of a point, as far as the parameter tells."""
         index = new.curve.parameter
-        reach = 1.5 * distance(new.u, point.u, new.weights) / new.weights[index]
-        for value in self._values:  # noqa: SIM110 - `any` takes three times as long
-            if -reach <= new.u[index] - value <= reach:
+        value, reach = new.u[index], reach / new.weights[index]
+        for own in self._values:  # noqa: SIM110 - `any` takes three times as long
+            if -reach <= value - own <= reach:
                 return True
         return False
 
@@ -256,13 +256,14 @@ class March:
                 curve = finer
                 continue
             point, largest = here, max(largest, new.curve.size(new.u))
-            at_home = count > 2 and home.near(point, new)
+            reach = 1.5 * distance(new.u, point.u, new.weights)
+            at_home = count > 2 and home.near(new, reach)
             back = home.passed(point, new) if at_home else None
             if back is not None:
                 self.closed, self.ending = True, Ending(EndReason.CLOSED)
                 yield back
                 return
-            at_mark = marked and mark.near(point, new)
+            at_mark = marked and mark.near(new, reach)
             if at_mark and count > marked + 3 and mark.passed(point, new) is not None:
                 self.ending = Ending(EndReason.ASTRAY, new.curve.where(new.u))
                 return
@@ -280,9 +281,8 @@ class March:
             if landed is not None:
                 # what comes to where it began need not have gone beyond it
                 back_again = count > 3 and home.retraced(point, landed, self.newton)
-                self.ending = Ending(
-                    EndReason.RETRACED if back_again else EndReason.RANGE_END, landed.curve.where(landed.u)
-                )
+                reason = EndReason.RETRACED if back_again else EndReason.RANGE_END
+                self.ending = Ending(reason, landed.curve.where(landed.u))
                 yield landed
                 return
             yield new
@@ -331,7 +331,7 @@ class March:
                     solved.u[curve.parameter] = bound
                 taken = distance(solved.u, point.u, point.weights)
                 new = _joined(point, make_point(solved, point.tangent, point.arclength + taken))
-                turn = _angle(point, new)
+                turn, meets, _ = course_between(point, new)
                 if step <= options.min_step:
                     # not at a jump across a corner, onto the part of the curve behind it, to be followed back into it
                     fine = float((new.weights * (new.u - point.u)) @ (new.weights * new.tangent)) > 0.0
@@ -344,7 +344,7 @@ class March:
                     fine = turn < options.sharpest and solved.distance < 0.4 * step
                     fine = fine and taken <= 1.000001 * options.max_step
                     # nor across a corner that lies nearer
-                    fine = fine and not _overshot(point, new)
+                    fine = fine and meets < _STRAIGHT
                     fine = fine and (self.inspect is None or self.inspect(point, new))
                 if fine:
                     beyond = _leaving(point, new) if step <= options.min_step else new
@@ -476,7 +476,7 @@ def _overshot(point: CurvePoint, new: CurvePoint) -> bool:
 
     The corner lies where the tangents meet: `new - point = d a + s b` with unit tangents a and b; s is negative then.
     """
-    return beyond_meeting(point.tangent, new.tangent, new.u - point.u, new.weights) >= _STRAIGHT
+    return course_between(point, new)[1] >= _STRAIGHT
 
 
 def _leaving(point: CurvePoint, new: CurvePoint) -> CurvePoint:
@@ -490,27 +490,7 @@ def _leaving(point: CurvePoint, new: CurvePoint) -> CurvePoint:
 
 def _angle(a: CurvePoint, b: CurvePoint) -> float:
     """Angle between the tangents of two points, radians."""
-    return angle(a.tangent, b.tangent, b.weights)
-
-
-@kernel()
-def angle(a, b, weights):
-    """Angle between two vectors in scaled variables, radians."""
-    return math.acos(min(1.0, max(-1.0, cosine(a, b, weights))))
-
-
-@kernel()
-def beyond_meeting(a, b, way, weights):
-    """Squared sine of the angle between the tangents a and b at the two ends of a way in scaled variables, where these
-    meet beyond its end; -1 elsewhere.
-    """
-    sizes = length(weights * a), length(weights * b)
-    one, other, between = np.empty(len(a)), np.empty(len(a)), weights * way
-    for i in range(len(a)):
-        one[i], other[i] = weights[i] * a[i] / sizes[0], weights[i] * b[i] / sizes[1]
-    cosine_between = np.dot(one, other)
-    overshot = np.dot(between, other) < cosine_between * np.dot(between, one)
-    return 1.0 - cosine_between**2 if overshot else -1.0
+    return course_between(a, b)[0]
 
 
 @kernel()

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from suboctave.continuation.linear import Factor, cosine, distance, length
+from suboctave.continuation.linear import Factor, cosine, course, distance, length
 from suboctave.continuation.newton import NewtonOptions, Solved, closely, correct, tangent
 from suboctave.continuation.problem import Array, Curve, Evaluation
 from suboctave.errors import ConvergenceError
@@ -80,6 +80,12 @@ def between(a: CurvePoint, b: CurvePoint, fraction: float) -> Array:
     first = s * r * r * chord / length(b.weights * ta)
     last = s * s * r * chord / length(b.weights * b.tangent)
     return (1.0 + 2.0 * s) * r * r * ua + first * ta + s * s * (3.0 - 2.0 * s) * b.u - last * b.tangent
+
+
+def course_between(a: CurvePoint, b: CurvePoint) -> tuple[float, float, float]:
+    """How a curve runs between two neighbours in one discretisation: see `linear.course`."""
+    found: tuple[float, float, float] = course(a.tangent, b.tangent, b.u - a.u, b.weights)
+    return found
 
 
 def point_between(

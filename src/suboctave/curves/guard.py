@@ -24,7 +24,7 @@ from itertools import pairwise
 import numpy as np
 
 from suboctave.compiled import kernel
-from suboctave.continuation.linear import length
+from suboctave.continuation.linear import course
 from suboctave.continuation.point import CurvePoint
 from suboctave.continuation.problem import Array
 from suboctave.curves.events.monitors import BRANCH_POINT, BifurcationKind, Located, NeimarkSacker, changes
@@ -257,13 +257,15 @@ class GuardedStep(Interior):
         """See `Interior.relative`: with the functions of multipliers in rings, equal ones taken for one, then of those
         that elements move.
         """
+        if self.turned or k == 0:
+            return
         told = _told(stencil)
-        known, apart = ([getattr(one, name) for one in told] for name in ("multipliers", "distinct"))
-        if self.turned or k == 0 or len({len(mu) for mu in known}) > 1 or not np.isfinite(known).all():
+        known = [one.multipliers for one in told]
+        if len({len(mu) for mu in known}) > 1 or not np.isfinite(known).all():
             return
         if _families(told):
-            yield in_rings(np.array(apart), k - 1)
-        elif len(apart[0]) == len(known[0]):
+            yield in_rings(np.array([one.distinct for one in told]), k - 1)
+        elif not told[0].repeated:
             yield in_rings(np.array(known), k - 1)
             yield of_those_moved(known, [s.grip for s in stencil], k - 1)
 
@@ -313,8 +315,7 @@ def _told(stencil: Sequence[Sample]) -> list[FloquetResult]:
 
 def _families(told: Sequence[FloquetResult]) -> bool:
     """Whether motions have families of equal multipliers, as many at all of them."""
-    counts = {len(one.distinct) for one in told}
-    return len(counts) == 1 and counts != {len(told[0].multipliers)}
+    return told[0].repeated and len({len(one.distinct) for one in told}) == 1
 
 
 def _open(p: Sample, q: Sample) -> bool:
@@ -329,18 +330,11 @@ def _pairs_change(p: Sample, q: Sample) -> bool:
 
 def _disagreement(a: CurvePoint, b: CurvePoint) -> float:
     """Distance between the chord and the mean tangent of a step, in units of its length."""
-    u, heading = b.curve.transfer(a.u, a.curve), b.curve.transfer(a.tangent, a.curve)
-    return _apart(b.u - u, heading, b.tangent, b.weights)
-
-
-@kernel()
-def _apart(chord, first, last, weights):
-    """Distance between the unit vector along one vector in scaled variables and the mean of those along two others."""
-    sizes, out = (length(weights * chord), length(weights * first), length(weights * last)), np.empty(len(chord))
-    for i in range(len(chord)):
-        mean = 0.5 * (weights[i] * first[i] / (sizes[1] or 1.0) + weights[i] * last[i] / (sizes[2] or 1.0))
-        out[i] = weights[i] * chord[i] / (sizes[0] or 1.0) - mean
-    return length(out) if sizes[0] > 0.0 else 0.0
+    u, heading = a.u, a.tangent
+    if a.curve is not b.curve:
+        u, heading = b.curve.transfer(u, a.curve), b.curve.transfer(heading, a.curve)
+    apart: float = course(heading, b.tangent, b.u - u, b.weights)[2]
+    return apart
 
 
 def _explained(p: Sample, q: Sample) -> bool:

@@ -72,15 +72,10 @@ def _exchange(linear: LinearPart, groups: tuple[Group, ...]) -> _Exchange:
 def grip(state: BalanceState, multipliers: ComplexArray) -> Grip:
     """What elements may do to the vibrations of a structure along a motion with these multipliers."""
     exchange = _exchange(state.linear, state.balance.all_groups)
-    count, channels = len(exchange.exponents), len(exchange.pushed)
-    stiffness, damping, at = np.zeros((channels, state.balance.top + 1)), np.zeros(channels), 0
-    for channel in state.channels:
-        for i in range(channel.count):
-            # the largest among the Fourier coefficients from each one on
-            stiffness[at] = np.maximum.accumulate(np.abs(channel.stiffness(i))[::-1])[::-1]
-            if channel.moving:  # its mean takes or gives energy by itself
-                damping[at] = np.abs(channel.damping(i)).max()
-            at += 1
+    count, (of_stiffness, of_damping) = len(exchange.exponents), np.abs(state.tangent_spectra)
+    # the largest among the Fourier coefficients from each one on; the mean of damping takes or gives energy by itself
+    stiffness = np.ascontiguousarray(np.maximum.accumulate(of_stiffness[:, ::-1], axis=1)[:, ::-1])
+    damping = np.maximum.reduce(of_damping, axis=1)
     strengths = np.empty((count, count))
     _strengths(exchange.exponents, exchange.pushed, exchange.read, stiffness, damping, state.rate, strengths)
     if len(multipliers) != count:

@@ -94,7 +94,8 @@ class HarmonicBalance(Equations):
         if values is not self.values and any(values[n] != self.values[n] for n in self.matrix_names):
             linear = linear.rebuilt(values)
         # the half-odd basis goes up to H + 1/2
-        return linear.covering((basis.harmonics + 0.5) / basis.nu * abs(float(omega)))
+        highest = (basis.harmonics + 0.5) / basis.nu * omega
+        return linear if -linear.covers <= highest <= linear.covers else linear.covering(abs(highest))
 
     @checked(result=True)
     def settle(self, x: Array, omega: float, values: Mapping[str, float] | None = None) -> HarmonicBalance:

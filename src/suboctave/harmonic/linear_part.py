@@ -33,11 +33,12 @@ from suboctave.units import UnitSystem
 @runtime_checkable
 class LinearPart(Protocol):
     """Contract of the linear part. `size` is the number of unknown DOFs; `loads` the directions of loads (l, n) that
-    these do not hold.
+    these do not hold; `covers` the highest circular frequency that it serves.
     """
 
     size: int
     loads: Array
+    covers: float
 
     @property
     def words(self) -> tuple[str, ...]:
@@ -141,6 +142,8 @@ class EquationOfMotion:
 
 class StructuralMatrices(EquationOfMotion):
     """Stiffness form straight from a system's matrices: `A = K - Omega^2 M + i Omega C + i sgn(Omega) S`."""
+
+    covers = np.inf
 
     def __init__(self, system: System, values: Mapping[str, float] | None = None) -> None:
         self.system = system
