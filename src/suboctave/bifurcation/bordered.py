@@ -145,14 +145,14 @@ def transversality(state: BalanceState, vectors: NullVectors, name: str) -> floa
 
 def bordered(state: BalanceState, kind: Kind, borders: NullVectors, kappa: float = 0.0) -> Bordered:
     """Evaluate g and the vectors of its gradient, bordered by `borders` (b = left, c = right)."""
-    n = len(borders.right)
+    n = borders.right.size
     scale = state.balance.row_weights(n)
     matrix = operator(state, kind, kappa)
     # the operator's own size balances the bordering rows
     size = state.omega**2
     row = np.zeros(n + 1, dtype=matrix.dtype)
-    row[:n] = size * borders.right.conj()
-    left = (size * borders.left).astype(matrix.dtype)
+    row[:n] = size * np.conjugate(borders.right)
+    left = np.multiply(size, borders.left, dtype=matrix.dtype)
     factor = bordered_factor(matrix * scale[:, None], scale, left[:, None], row)
     rhs = np.zeros(n + 1, dtype=factor.lu.dtype)
     rhs[n] = size

@@ -135,9 +135,9 @@ def contacts_between(p: Sample, q: Sample) -> Contacts:
         young_a, young_b = p.young[n], q.young[n]
         # one without its like has merged with a neighbour on its own side of the gap, which is no grazing
         for i, j in pairs.tolist():
-            if young_a.get(i, math.inf) < _SHRINKS * _over(b, j):
+            if i in young_a and young_a[i] < _SHRINKS * _over(b, j):
                 shrinking.append((n, float(a.tau[i]), float(a.curve[i]), False))
-            if young_b.get(j, math.inf) < _SHRINKS * _over(a, i):
+            if j in young_b and young_b[j] < _SHRINKS * _over(a, i):
                 shrinking.append((n, float(b.tau[j]), float(b.curve[j]), True))
     return Contacts(None, tuple(shrinking))
 

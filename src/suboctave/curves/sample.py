@@ -318,6 +318,8 @@ class Sample:
     def instant_or_frequency(self) -> float:
         """The instant tau in (0, 2 pi) of a grazing, kappa of an NS, zeta of a mode, else 0."""
         equations = self.evaluation.equations.own
+        if isinstance(equations, SingularEquations):
+            return equations.kappa
         if isinstance(equations, GrazingEquations):
             return equations.tau % (2.0 * math.pi)
         if isinstance(equations, ModeEquations):

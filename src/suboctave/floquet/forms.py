@@ -116,7 +116,7 @@ def forms_along(level: Level, sequence: tuple[tuple[float, ...], ...]) -> tuple[
     free = form_of(level, (0.0,) * len(level.flexible))
     assert free is not None
     chosen = [form_of(level, held) or free for held in sequence]
-    most, size = max(len(form.motion) for form in chosen), len(free.driven)
+    most, size = max([len(form.motion) for form in chosen]), len(free.driven)
     motion, first = np.zeros((len(chosen), most, 2, 2)), np.full((len(chosen), most + 1), size)
     coupling = np.zeros((len(chosen), len(free.coupling), 2 * most))
     for r, form in enumerate(chosen):
@@ -132,5 +132,7 @@ def forms_along(level: Level, sequence: tuple[tuple[float, ...], ...]) -> tuple[
             turns[r] = old.out if new is free else new.back
         else:
             np.dot(new.back, old.out, out=turns[r])
-    driven, read, flexible = (np.stack([getattr(f, name) for f in chosen]) for name in ("driven", "read", "flexible"))
-    return Forms(motion, first, driven, read, coupling, flexible, turns, turning), max(f.rounding for f in chosen)
+    # of many small arrays `np.array` makes one without asking each what it is
+    driven, read = np.array([form.driven for form in chosen]), np.array([form.read for form in chosen])
+    flexible, rounding = np.array([form.flexible for form in chosen]), max([form.rounding for form in chosen])
+    return Forms(motion, first, driven, read, coupling, flexible, turns, turning), rounding

@@ -45,7 +45,6 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-import scipy.linalg
 from scipy.linalg import lapack
 
 from suboctave.floquet.channels import BLIND, Channels
@@ -471,6 +470,10 @@ def _beside_fold(motion: Linearised, gap: float, moved: float) -> tuple[ComplexA
     return mu, shift, share
 
 
+def _unsorted() -> None:
+    """What LAPACK is given in the place of a choice that it asks for eigenvalue by eigenvalue."""
+
+
 def projector(phi: Array, mu: ComplexArray) -> Array:
     """On the invariant subspace of the multipliers nearest to +1, one or several that lie together, (N, N); mu (N,):
     all of them.
@@ -478,7 +481,9 @@ def projector(phi: Array, mu: ComplexArray) -> Array:
     With `phi = Q [[A, X], [0, B]] Q^T`, A with these multipliers, it is `Q [[1, R], [0, 0]] Q^T`, `A R - R B = X`.
     """
     reach = _TOGETHER * float(np.abs(1.0 - mu).min())
-    schur, q, count = scipy.linalg.schur(phi, sort=lambda re, im: math.hypot(1.0 - re, im) <= reach)
+    schur, _, real, imaginary, q, _, _ = lapack.dgees(_unsorted, phi)
+    chosen = np.hypot(1.0 - real, imaginary) <= reach
+    schur, q, _, _, count, *_ = lapack.dtrsen(chosen.astype(np.int32), schur, q, job="N")
     inside, coupling, outside = schur[:count, :count], schur[:count, count:], schur[count:, count:]
     beside = coupling
     if 0 < count < len(phi):

@@ -233,9 +233,13 @@ class BalanceState:
 
     def local(self, index: int) -> LocalMotion:
         """One of the system's elements on the motion."""
-        member = self.laws.members[index]
-        channel = next(channel for channel in self.channels if index in channel.group.members)
-        return LocalMotion(member.element, member.kind, member.coefficients, channel.along.motions)
+        member, group, groups = self.laws.members[index], self.balance.group_of[index], self.balance.groups
+        if group in groups:
+            g = groups.index(group)
+            motions = self.motions[g : g + 1]
+        else:
+            motions = self._displacements(sparse(group.inputs), len(group.inputs))
+        return LocalMotion(member.element, member.kind, member.coefficients, motions)
 
     @lazy
     def _spectra(self) -> ComplexArray:
