@@ -132,7 +132,7 @@ def contacts_between(p: Sample, q: Sample) -> Contacts:
             return Contacts(0.5)
         if least >= YOUNG:
             continue
-        young_a, young_b = p.young[n], q.young[n]
+        young_a, young_b = p.young(n), q.young(n)
         # one without its like has merged with a neighbour on its own side of the gap, which is no grazing
         for i, j in pairs.tolist():
             if i in young_a and young_a[i] < _SHRINKS * _over(b, j):

@@ -81,6 +81,7 @@ class Sample:
         self.curve = point.curve
         self.evaluation = point.evaluation
         self.state: BalanceState = point.evaluation.state
+        self._young: dict[int, Excursions] = {}
 
     def at(self, point: CurvePoint) -> Sample:
         """Another point, with multipliers by the same method."""
@@ -223,20 +224,19 @@ class Sample:
             replace(gap, value=np.where(np.abs(gap.value - gap.level) <= near, gap.level, gap.value)) for gap in found
         )
 
-    @lazy
-    def young(self) -> list[Excursions]:
-        """Of every gap the excursions across it that may end soon."""
-        found = []
-        # there are few extrema: numbers are quicker than arrays
-        for gap in self.gaps:
-            values, level, heights = gap.value.tolist(), gap.level, {}
+    def young(self, which: int) -> Excursions:
+        """Of one of the gaps the excursions across it that may end soon."""
+        if which not in self._young:
+            gap, heights = self.gaps[which], Excursions()
+            # there are few extrema: numbers are quicker than arrays
+            values, level = gap.value.tolist(), gap.level
             most = YOUNG * max(map(abs, values), default=0.0)
             for i, (value, curve) in enumerate(zip(values, gap.curve.tolist(), strict=True)):
                 height = level - value if curve > 0.0 else value - level
                 if 0.0 < height < most:
                     heights[i] = height
-            found.append(heights)
-        return found
+            self._young[which] = heights
+        return self._young[which]
 
     @lazy
     def brevity(self) -> float:

@@ -349,8 +349,8 @@ class Linearised:
         worst, rate = 1.0, self.state.rate
         # rounding of the largest stiffness, or damping times the frequency
         least = _EPS * max(float(np.abs(self.law[:, 1]).max()), rate * float(np.abs(self.law[:, 2]).max()), _TINY)
-        for g in self.active.tolist():
-            most, motion = (float(np.abs(part[g, 0]).max()) for part in (change, self.path))
+        sizes = [np.maximum.reduce(np.abs(part[self.active, 0]), axis=1).tolist() for part in (change, self.path)]
+        for g, most, motion in zip(self.active.tolist(), *sizes, strict=True):
             if most <= _LARGEST * motion:
                 continue
             own = self._own.together(g)
