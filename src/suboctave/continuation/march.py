@@ -326,7 +326,7 @@ class March:
         while True:
             try:
                 guess, row, bound = self._predicted(point, points[:order], tangents[:order], step)
-                solved = self._solved(curve, guess, row, point.weights, step)
+                solved = self._solved(point, guess, row, step)
                 if bound is not None:
                     solved.u[curve.parameter] = bound
                 taken = distance(solved.u, point.u, point.weights)
@@ -359,15 +359,17 @@ class March:
             order = max(1, order - 1)
             step = max(0.5 * step, options.min_step)
 
-    def _solved(self, curve: Curve, guess: Array, row: Array | int, weights: Array, step: float) -> Solved[Curve]:
-        """The point beside a prediction; of a short step, or where the curve asks for it, more closely: what the
-        tolerance leaves open may be as long as the step, or as a sharp turn is wide.
+    def _solved(self, point: CurvePoint, guess: Array, row: Array | int, step: float) -> Solved[Curve]:
+        """The point beside a prediction, ahead of another one; of a short step, or where the curve asks for it, more
+        closely: what the tolerance leaves open may be as long as the step, or as a sharp turn is wide.
         """
+        curve, weights, near = point.curve, point.weights, point.before or point
         delicate = getattr(curve, "delicate", False)
         if delicate or step < _CLOSELY:
             try:
                 close = closely(self.newton)
-                return correct(curve, guess, row, weights, close, spare=0.0 if delicate else _SPARED * step)
+                spare = 0.0 if delicate else _SPARED * step
+                return correct(curve, guess, row, weights, close, spare=spare, near=near)
             except ConvergenceError:
                 # by rounding perhaps
                 solved = correct(curve, guess, row, weights, self.newton)
@@ -375,7 +377,7 @@ class March:
                 if solved.factor.singular or length(solved.factor.solve(missing)) > _LEFT * step:
                     raise
                 return solved
-        return correct(curve, guess, row, weights, self.newton, spare=_SPARED * step)
+        return correct(curve, guess, row, weights, self.newton, spare=_SPARED * step, near=near)
 
     def _predicted(
         self, point: CurvePoint, points: Array, tangents: Array, step: float
@@ -468,7 +470,9 @@ def _rescaled(curve: Curve, point: CurvePoint, largest: float) -> CurvePoint:
     size = length(weights * along)
     if not 0.0 < size < math.inf:
         raise OverflowError(f"the tangent has the length {size:g}")
-    return CurvePoint(curve, u, along / size, weights, p.evaluation, p.orientation, p.arclength, p.iterations)
+    return CurvePoint(
+        curve, u, along / size, weights, p.evaluation, p.orientation, p.arclength, p.iterations, before=p.before or p
+    )
 
 
 def _overshot(point: CurvePoint, new: CurvePoint) -> bool:

@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Generic, TypeVar
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
@@ -23,6 +23,9 @@ from suboctave.interruption import check_time
 
 #: correction in scaled arclength below which the Jacobian is not computed anew
 _SHORT = 1e-3
+#: unknowns from which factors cost as much as a correction by old ones, and from there on more as the square; how much
+#: of a correction the next one by old factors may be
+_DEAR, _SLOWEST = 150, 0.5
 #: correction, in units of motions and ranges, that leads away from a guess of a square system; corrections of one after
 #: which the rate counts: where two solutions are about to merge the first tell little
 _FAR, _TELLING = 4.0, 3
@@ -92,6 +95,19 @@ class Solved(Generic[Equations_co]):
     distance: float
 
 
+class Nearby(Protocol):
+    """A point of a curve: its tangent (in u), and the LU factors that it was solved with, scaled by its weights."""
+
+    @property
+    def tangent(self) -> Array: ...
+
+    @property
+    def weights(self) -> Array: ...
+
+    @property
+    def factor(self) -> Factor | None: ...
+
+
 @lru_cache(maxsize=16)
 def closely(options: NewtonOptions) -> NewtonOptions:
     """The same for points that are wanted about as exactly as rounding allows."""
@@ -115,6 +131,7 @@ def correct(
     options: NewtonOptions,
     known: Factor | None = None,
     spare: float = 0.0,
+    near: Nearby | None = None,
 ) -> Solved[Equations]:
     """Solve `F(u) = 0`, `row . (weights * (u - guess)) = 0`, starting from the guess.
 
@@ -129,14 +146,35 @@ def correct(
     spare
         Way in scaled arclength within which the derivatives of an iterate count as those of the point, if the
         evaluation can keep them.
+    near
+        A point close by: where factors are dear its own are tried first, for as long as corrections shrink.
 
     Raises ConvergenceError if the iterations do not contract or run out.
     """
     fixed, plane = (row, np.eye(1, len(guess), row)[0]) if isinstance(row, int) else (None, row)
+    if near is not None and plane is not None and len(guess) >= 2 * _DEAR:
+        early = _beside(curve, guess, plane, weights, options, near)
+        if early is not None:
+            return early
+    return _newton(curve, guess, fixed, plane, weights, options, known, spare)
+
+
+def _newton(
+    curve: Equations,
+    guess: Array,
+    fixed: int | None,
+    plane: Array | None,
+    weights: Array,
+    options: NewtonOptions,
+    known: Factor | None,
+    spare: float,
+) -> Solved[Equations]:
+    """Newton's method for `correct`: the row as numbers, `plane`, or the unknown that is fixed as well."""
     u, last, factor = guess.copy(), None, known
     way, before, contraction, first, previous = 0.0, 0.0, 0.0, 0.0, math.inf
     nearest: Solved[Equations] | None = None
-    for iteration in range(options.iterations + 1):
+    iteration, cheap = 0, 0 if options.damped else (len(u) // _DEAR) ** 2
+    while True:
         check_time()
         evaluation = curve.evaluate(u)
         error = evaluation.error
@@ -154,13 +192,17 @@ def correct(
         # after a short step that contracts, the old factors take the next one as far; where that is not far enough, new
         # ones are those of the point as well
         stale = previous > _SHORT or contraction > 0.1 or (spare > 0.0 and 2.0 * error**2 > options.tolerance * before)
-        if factor is None or (iteration > 0 and stale):
-            factor = factorised(evaluation, plane, weights)
-            last, way = evaluation, 0.0
+        rhs = evaluation.residual if plane is None else _beneath(evaluation.residual, plane.dot(weights * (u - guess)))
+        stale, step = stale and iteration > 0, None
+        if factor is not None and (not stale or cheap > 0):
+            step = factor.solve(rhs)
+            if stale and _corrections(length(step), previous, error / options.tolerance) > cheap:
+                step = None
+        if factor is None or step is None:
+            factor, last, way, stale = factorised(evaluation, plane, weights), evaluation, 0.0, False
+            step = factor.solve(rhs)
         if factor.singular:
             raise ConvergenceError(f"the equations are singular at {curve.where(u)}")
-        rhs = evaluation.residual
-        step = factor.solve(rhs if plane is None else _beneath(rhs, plane.dot(weights * (u - guess))))
         if fixed is not None:
             step[fixed] = 0.0  # but for rounding of the factors it is
         size = length(step)
@@ -179,6 +221,7 @@ def correct(
             if lost and not options.damped and nearest is None:
                 break
         previous = size if share == 1.0 else math.inf
+        iteration, cheap = (iteration, cheap - 1) if stale else (iteration + 1, cheap)
     # beside a pole of the equations a rounding of the unknowns moves them by any amount: nothing is solved there
     if nearest is not None and nearest.evaluation.error <= math.sqrt(options.tolerance):
         return nearest
@@ -192,6 +235,43 @@ def _takes_over(evaluation: Evaluation, other: Evaluation) -> bool:
     """See `Evaluation`."""
     takes_over: Callable[[Evaluation], bool] | None = getattr(evaluation, "takes_over", None)
     return takes_over is not None and takes_over(other)
+
+
+def _beside(
+    curve: Equations, guess: Array, row: Array, weights: Array, options: NewtonOptions, near: Nearby
+) -> Solved[Equations] | None:
+    """The same by the factors of a point close by alone, None where its own serve better."""
+    most, u, previous, contraction = (len(guess) // _DEAR) ** 2, guess, math.inf, 1.0
+    factor, along, plane = near.factor, near.tangent, row * weights
+    if factor is None or factor.singular or len(along) != len(guess) or options.damped or options.rounding:
+        return None
+    for iteration in range(most):
+        try:
+            evaluation = curve.evaluate(u)
+        except ConvergenceError:
+            return None
+        error = evaluation.error
+        if not math.isfinite(error):
+            return None
+        if error <= options.tolerance and previous * contraction <= options.correction:
+            factor = factorised(evaluation, row, weights)
+            return Solved(curve, u, evaluation, weights, factor, 1, distance(u, guess, weights))
+        step = factor.solve(_beneath(evaluation.residual, 0.0)) / near.weights
+        # along the tangent, which the equations map to nothing, back into the plane
+        step += along * (plane.dot(u - guess - step) / plane.dot(along))
+        size = length(weights * step)
+        if iteration > 0 and _corrections(size, previous, error / options.tolerance) > most - iteration:
+            return None
+        contraction = min(1.0, size / previous) if iteration > 0 else 1.0
+        u, previous = u - step, size
+    return None
+
+
+def _corrections(size: float, previous: float, error: float) -> float:
+    """How many corrections by old factors are left if all shrink as this one does, for an error in tolerances."""
+    if not (previous < math.inf and size < _SLOWEST * previous):
+        return math.inf
+    return math.log(max(error, 1.0)) / math.log(previous / size) if size > 0.0 else 0.0
 
 
 def _beneath(vector: Array, number: float) -> Array:

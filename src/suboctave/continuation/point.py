@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from suboctave.continuation.linear import Factor, cosine, course, distance, length
-from suboctave.continuation.newton import NewtonOptions, Solved, closely, correct, tangent
+from suboctave.continuation.newton import Nearby, NewtonOptions, Solved, closely, correct, tangent
 from suboctave.continuation.problem import Array, Curve, Evaluation
 from suboctave.errors import ConvergenceError
 
@@ -15,7 +15,7 @@ from suboctave.errors import ConvergenceError
 @dataclass(eq=False, slots=True)
 class CurvePoint:
     """A point of a curve with its tangent (in u, unit length in scaled arclength); `factor` as in `Solved`, while the
-    point is new.
+    point is new, and `before` the same point in the weights that it was solved with.
     """
 
     curve: Curve
@@ -27,6 +27,7 @@ class CurvePoint:
     arclength: float
     iterations: int
     factor: Factor | None = None
+    before: CurvePoint | None = None
 
     @property
     def parameter(self) -> float:
@@ -60,16 +61,17 @@ def solved_point(
     along: Array | None,
     arclength: float,
     spare: float = 0.0,
+    near: Nearby | None = None,
 ) -> CurvePoint:
-    """The point of a curve in the plane through a guess across a scaled row, `spare` as in `newton.correct`; solved for
-    in the coordinates in which the curve is regular, where it has its own. May raise ConvergenceError.
+    """The point of a curve in the plane through a guess across a scaled row, `spare` and `near` as in `newton.correct`;
+    solved for in the coordinates in which the curve is regular, where it has its own. May raise ConvergenceError.
     """
     regular = getattr(curve, "regular", None)
     own = None if regular is None else regular(guess)
     if own is not None:
         point: CurvePoint = own.solved_point(guess, row, weights, newton, along, arclength, spare)
         return point
-    return make_point(correct(curve, guess, row, weights, newton, spare=spare), along, arclength)
+    return make_point(correct(curve, guess, row, weights, newton, spare=spare, near=near), along, arclength)
 
 
 def between(a: CurvePoint, b: CurvePoint, fraction: float) -> Array:
@@ -107,7 +109,8 @@ def point_between(
     row /= length(row)
     arclength = a.arclength + fraction * (b.arclength - a.arclength)
     try:
-        return solved_point(b.curve, guess, row, b.weights, closely(newton) if exactly else newton, chord, arclength)
+        options = closely(newton) if exactly else newton
+        return solved_point(b.curve, guess, row, b.weights, options, chord, arclength, near=b.before or b)
     except ConvergenceError:
         if not exactly:
             raise
