@@ -521,3 +521,63 @@ def test_the_other_side_of_a_hairpin_is_not_the_same_place():
     same = [point if point.tangent[1] > 0.0 else point.turned for point in same]
     assert Place(there).retraced(*same, NEWTON)
     assert not Place(there.turned).retraced(*same, NEWTON)
+
+
+class Springs:
+    """Many cubic springs, `x + sum / n + x^3 = parameter`, in other units than they are weighed by; its derivatives are
+    counted.
+    """
+
+    def __init__(self, count):
+        self.count, self.asked, self.parameter = count, 0, count
+
+    def evaluate(self, u):
+        return Spring(self, u)
+
+    def weights(self, u, largest):
+        return np.full(self.count + 1, 2.0)
+
+    def where(self, u):
+        return "here"
+
+
+@dataclass
+class Spring:
+    curve: Springs
+    u: np.ndarray
+
+    @property
+    def residual(self):
+        x = self.u[:-1]
+        return x + x.mean() + x**3 - self.u[-1] * np.linspace(0.5, 1.5, len(x))
+
+    @property
+    def error(self):
+        return float(np.abs(self.residual).max())
+
+    @property
+    def jacobian(self):
+        self.curve.asked += 1
+        n = self.curve.count
+        own = np.diag(1.0 + 3.0 * self.u[:-1] ** 2) + 1.0 / n
+        return np.concatenate((own, -np.linspace(0.5, 1.5, n)[:, None]), axis=1)
+
+
+@pytest.mark.parametrize("count", [3, 450])
+def test_many_unknowns_are_corrected_by_factors_of_the_point_before(count):
+    """To the same point as by those of their own; factors that lead nowhere change nothing."""
+    curve, solved = Springs(count), []
+    weights = curve.weights(None, 0.0)
+    at = np.append(np.zeros(count), 0.3)
+    row = np.eye(1, count + 1, count)[0]
+    point = make_point(correct(curve, at, row, weights, NEWTON), row, 0.0)
+    guess, along = point.u + 0.02 * point.tangent, weights * point.tangent
+    for near in (None, point):
+        curve.asked = 0
+        found = correct(curve, guess, along, weights, NEWTON, near=near)
+        solved.append((found.u, curve.asked))
+    assert np.abs(solved[0][0] - solved[1][0]).max() < 1e-9
+    assert solved[1][1] == (1 if count > 300 else solved[0][1])
+    far = point.u.copy()
+    far[:-1] += np.linspace(-2.0, 2.0, count)
+    assert np.array_equal(*(correct(curve, far, along, weights, NEWTON, near=near).u for near in (None, point)))
