@@ -25,7 +25,7 @@ from suboctave.study import compilation, computations
 SOURCE = """
 from suboctave.compiled import kernel
 
-@kernel()
+@kernel(inner=True)
 def inner(x):
     return x * x
 
@@ -85,6 +85,24 @@ def test_what_an_earlier_process_has_compiled_is_loaded_without_a_word(made, cap
     assert total(VALUES) == 30.0
     assert sum(total.stats.cache_hits.values()) == 1
     assert not capsys.readouterr().err
+
+
+def test_a_kernel_that_has_been_loaded_calls_one_that_is_compiled_anew(made, tmp_path):
+    made()(VALUES)
+    for path in (tmp_path / "cache").rglob("*inner*"):
+        path.unlink()
+    total = made()
+    assert total(VALUES) == 30.0
+    assert sum(total.stats.cache_hits.values()) == 1
+    assert sum(total.py_func.__globals__["inner"].stats.cache_misses.values()) == 1
+
+
+def test_an_inner_kernel_is_refused_to_python(made):
+    total = made()
+    for _ in range(2):
+        with pytest.raises(TypeError, match="called by kernels only"):
+            total.py_func.__globals__["inner"](2.0)
+        assert total(VALUES) == 30.0
 
 
 CALLED = """
@@ -309,7 +327,7 @@ print(turns.tobytes().hex(), values.tobytes().hex(), sums.tobytes().hex())
 
 
 def test_the_process_that_compiles_computes_the_same_digits_as_those_that_load(tmp_path):
-    """Sums that may be reordered are part of whatever calls them, not a second copy compiled in other company."""
+    """Sums that may be reordered are compiled once, not a second time as a part of what calls them."""
     environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
 
     def digits() -> str:

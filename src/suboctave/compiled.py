@@ -15,6 +15,7 @@ With `NUMBA_DISABLE_JIT=1` kernels are the Python functions that they are writte
 
 from __future__ import annotations
 
+import copy
 import gc
 import hashlib
 import itertools
@@ -28,10 +29,11 @@ from pathlib import Path
 from time import monotonic
 from typing import Any, TypeVar
 
+import llvmlite.binding as llvm
 import numpy as np
 from numba import config, njit
 from numba.core import event
-from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.types.misc import unliteral
 
@@ -42,6 +44,10 @@ _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 #: all kernels that have been imported, as Numba's dispatchers
 KERNELS: list[Any] = []
+
+#: the same, by module and name; and by its symbol, each that other kernels call, with the types of its arguments
+_NAMED: dict[str, Any] = {}
+_CALLED: dict[str, tuple[str, Any]] = {}
 
 #: LLVM's level of optimisation and whether it makes vectors of loops: with `fastmath`, and without
 _THOROUGH = (config.OPT, config.LOOP_VECTORIZE)
@@ -107,8 +113,8 @@ class _Compilation(event.Listener):
     """Compiles a kernel with no more effort than its kind repays.
 
     Loops are put into vector registers in kernels with `fastmath` only: elsewhere that gains nothing measurable, and
-    half of LLVM's time would go into it. What a kernel calls has been optimised already. Numba makes millions of small
-    objects; collecting garbage among them would take a tenth of the time.
+    half of LLVM's time would go into it. Numba makes millions of small objects; collecting garbage among them would
+    take a tenth of the time.
     """
 
     def __init__(self) -> None:
@@ -200,8 +206,26 @@ class _Files(IndexDataCacheFile):
         return hashlib.blake2b(block, digest_size=cls._DIGEST).digest()
 
 
+class _Kept(CompileResultCacheImpl):
+    """What is kept of a kernel: its code, and which kernels that calls."""
+
+    def reduce(self, result: Any) -> Any:
+        """What can be pickled."""
+        symbols = {function.name for function in result.library._final_module.functions if function.is_declaration}
+        return [called for symbol, called in _CALLED.items() if symbol in symbols], super().reduce(result)
+
+    def rebuild(self, target: Any, kept: Any) -> Any:
+        """The kernel, after those that it calls."""
+        called, result = kept
+        for name, types in called:
+            _NAMED[name].compile(types)
+        return super().rebuild(target, result)
+
+
 class Cache(FunctionCache):
     """Numba's cache of a kernel, which is known by the files of all kernels that are in it, not by its own alone."""
+
+    _impl_class = _Kept
 
     def __init__(self, function: Callable[..., Any], called: list[Any]) -> None:
         super().__init__(function)
@@ -304,20 +328,52 @@ def cached(**options: Any) -> Callable[[_Function], Any]:
     return decorate
 
 
-def kernel(**options: Any) -> Callable[[_Function], Any]:
+def _called_by_symbol(function: Any, name: str) -> None:
+    """Have kernels call this one where it is.
+
+    Numba would put a copy into each of its callers, and so on upwards, and optimise it anew in each. Where sums may be
+    reordered (`fastmath`), each copy would be another function, and which of them runs would depend on what the process
+    has compiled or loaded before.
+    """
+    add_overload, target = function.add_overload, function.targetctx
+
+    def add(result: Any) -> None:
+        add_overload(result)
+        types = result.signature.args
+        symbol = f"{name}.{hashlib.blake2b(str(types).encode(), digest_size=8).hexdigest()}"
+        llvm.add_symbol(symbol, result.library.get_pointer_to_function(result.fndesc.llvm_func_name))
+        _CALLED[symbol] = name, types
+        elsewhere = copy.copy(result.fndesc)
+        elsewhere.mangled_name = symbol
+        target.remove_user_function(result.entry_point)
+        target.insert_user_function(result.entry_point, elsewhere)
+
+    function.add_overload = add
+
+
+def kernel(*, inner: bool = False, **options: Any) -> Callable[[_Function], Any]:
     """Decorator of a kernel: `cached` with these options; a quotient by zero is not finite, without an exception.
 
-    Sums that the compiler may reorder (`fastmath`) are inlined wherever they are called, with all that is around them.
-    Else each caller would have a copy beside the original, compiled in other company and so reordered otherwise, and
-    which of them runs would depend on what the process has compiled or loaded before.
+    One that only other kernels call is `inner`: a seventh of the time to compile it would go into making it callable
+    from Python. What innermost loops call takes `forceinline` and becomes a part of each caller: arrays are counted at
+    every call by symbol.
     """
 
     def decorate(function: _Function) -> Any:
         if config.DISABLE_JIT:
             return np.errstate(all="ignore")(function)
-        called = [function.__globals__.get(name) for name in function.__code__.co_names]
-        inlined = "fastmath" in options or any(getattr(k, "targetoptions", {}).get("forceinline") for k in called)
-        result = cached(forceinline=inlined, **{"error_model": "numpy", "no_cfunc_wrapper": True} | options)(function)
+        name = f"{function.__module__}.{function.__name__}"
+        usual = {"error_model": "numpy", "fastmath": False, "no_cfunc_wrapper": True, "no_cpython_wrapper": inner}
+        result = cached(**usual | options)(function)
+        if inner:
+
+            def refuse(*_: Any, **__: Any) -> None:
+                raise TypeError(f"{name} is called by kernels only: it is `inner`")
+
+            result._compile_for_args, result._insert = refuse, lambda *_: None
+        if not options.get("forceinline"):
+            _called_by_symbol(result, name)
+        _NAMED[name] = result
         KERNELS.append(result)
         return result
 

@@ -63,7 +63,7 @@ def _settled(places: Array, functions: Array, at: int) -> bool:
     return zeros <= 1 and bool(_first_doubtful(places, functions, at, 0)[1] < 0.0)
 
 
-@kernel()
+@kernel(inner=True, forceinline=True)
 def _third(places, values, i):
     """The modulus of f[x_i, x_i+1, x_i+2, x_i+3]."""
     a, b, c, d = places[i], places[i + 1], places[i + 2], places[i + 3]
@@ -73,7 +73,7 @@ def _third(places, values, i):
     return abs(((last - middle) / (d - b) - (middle - first) / (c - a)) / (d - a))
 
 
-@kernel()
+@kernel(inner=True)
 def _interpolated(places, tests, at, k, values):
     """Function k in units of its largest value into `values`; its cubic off the chord by `bent`, `third` and `shift`,
     and the third differences that foretell it from before and behind.

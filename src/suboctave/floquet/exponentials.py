@@ -57,7 +57,7 @@ _POWERS = _powers()
 _FACTORIALS = np.array([1.0 / math.factorial(i) for i in range(ORDER + _TERMS + 1)])
 
 
-@kernel(fastmath=_FAST, error_model="numpy")
+@kernel(inner=True, forceinline=True, fastmath=_FAST, error_model="numpy")
 def exponential(mean, square, t):
     """e_0, e_1 with `exp(L t) = e_0 + e_1 L` for a matrix whose eigenvalues are `mean +- sqrt(square)`."""
     if square < 0.0:
@@ -71,7 +71,7 @@ def exponential(mean, square, t):
     return 0.5 * (low + high) - mean * odd, odd
 
 
-@kernel(fastmath=_FAST, error_model="numpy")
+@kernel(inner=True, fastmath=_FAST, error_model="numpy")
 def _uniform(length, mean, square, e, w):
     """`_integrals` on a panel of this length that is uniform in time."""
     m = ORDER
@@ -100,7 +100,7 @@ def _uniform(length, mean, square, e, w):
             w[0, j * m + l], w[1, j * m + l] = t * x, t * t * y
 
 
-@kernel(fastmath=_FAST, error_model="numpy")
+@kernel(inner=True, fastmath=_FAST, error_model="numpy")
 def _integrals(times, left, rate, mean, square, e, w):
     """e_0, e_1 at the nodes into e (2, m), and w_0, w_1 into w (2, m m), on one panel, but for those at the first node;
     mean, square: see `exponential`.
@@ -128,7 +128,7 @@ def _integrals(times, left, rate, mean, square, e, w):
                 w[1, new + l] += y * _VALUES[i, g, l]
 
 
-@kernel(fastmath=_FAST, error_model="numpy")
+@kernel(inner=True, fastmath=_FAST, error_model="numpy")
 def _times(span, times, left, rate):
     """What `_integrals` wants of a panel with dt/ds = span (m,); returns whether it is uniform in time."""
     uniform = True
@@ -145,7 +145,7 @@ def _times(span, times, left, rate):
     return uniform
 
 
-@kernel(fastmath=_FAST, error_model="numpy")
+@kernel(inner=True, fastmath=_FAST, error_model="numpy")
 def _kinds(spans, stretch):
     """A number for every panel, the same for those of one stretch that are the same, and the first of every kind."""
     kinds, first = np.empty((2, spans.shape[0]), dtype=np.int64)
@@ -215,7 +215,7 @@ def structure(spans, stretch, forms):
     return kinds, moved, e, w, made, reading, influence, np.empty((count, size, nodes))
 
 
-@kernel(fastmath=_FAST, error_model="numpy")
+@kernel(inner=True, forceinline=True, fastmath=_FAST, error_model="numpy")
 def act(structures, d, forms, r, acts, moving):
     """Know of a kind of panels d with the form r what the channels that act, (G,), make of one another, without q' if
     none of them has damping.
@@ -263,7 +263,7 @@ def act(structures, d, forms, r, acts, moving):
                         influence[d, 0, g * m + j, h * m + j] += forms.flexible[r, g, h]
 
 
-@kernel(fastmath=_FAST, error_model="numpy")
+@kernel(inner=True, forceinline=True, fastmath=_FAST, error_model="numpy")
 def along(e, w, motion, first, driven, force, start, since, states):
     """The states (m, S) at the nodes of a panel, from the node `since` on, from those at its beginning, `start` (S, 1),
     and forces at the nodes (G m,); e, w: see `structure`, of one kind.

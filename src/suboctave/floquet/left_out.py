@@ -214,7 +214,7 @@ class Motions(NamedTuple):
     jumps: bool
 
 
-@kernel()
+@kernel(inner=True)
 def _jumps(tangents, active):
     """n times the Fourier coefficients of stiffness and damping behind the last one that is known, if they go on as
     those of a jump do, (2, G), and the last coefficient that counts; nothing jumps where that comes before the others.
@@ -238,7 +238,7 @@ def _jumps(tangents, active):
     return jumps, last
 
 
-@kernel(fastmath=_FAST, error_model="numpy")
+@kernel(inner=True, fastmath=_FAST, error_model="numpy")
 def _motion(blocks, i, rate, drives, reads):
     """What drives a motion of block i, into drives (G,), and what channels read of it and of its rate, into reads (2,
     G); returns its exponent.
@@ -304,7 +304,7 @@ def motions(tangents, active, rate, blocks, count):
     return Motions(exponents, left, force, back, jumping, struck, damped, jumps.sum() > 0.0)
 
 
-@kernel(fastmath=_FAST, error_model="numpy")
+@kernel(inner=True, fastmath=_FAST, error_model="numpy")
 def _coupled(couples, b, force, back, i, n):
     """How much a block b, see `LeftOut`, couples the motion i with itself by the coefficient n, see `Motions`."""
     driven = read = 0.0
@@ -314,7 +314,7 @@ def _coupled(couples, b, force, back, i, n):
     return driven * read
 
 
-@kernel(fastmath=_FAST, error_model="numpy")
+@kernel(inner=True, fastmath=_FAST, error_model="numpy")
 def _repelled(known, i, missing, rate):
     """How far blocks that are left out move the motion i at resonance, by coefficients that are known."""
     lines, nu, decay, total = known.force.shape[1], abs(known.exponents[i].imag), known.exponents[i].real, 0.0
@@ -335,7 +335,7 @@ def _repelled(known, i, missing, rate):
     return total
 
 
-@kernel(fastmath=_FAST, error_model="numpy")
+@kernel(inner=True, fastmath=_FAST, error_model="numpy")
 def _answered(missing, frequency, force, back, damped):
     """What drives a motion, back (2, G), by what is left out of the answer to forces (G,) at a frequency: of channels'
     own forces, and a bound of the rest.
@@ -399,7 +399,7 @@ def _echoes(missing, rate, last, jumps):
     return math.pi * np.sqrt(squares)
 
 
-@kernel(fastmath=_FAST, error_model="numpy")
+@kernel(inner=True, fastmath=_FAST, error_model="numpy")
 def _by_jumps(missing, echoes, last, nu, force, back):
     """The same by all coefficients behind the frequency `last`, as those of jumps, of a motion of the frequency nu."""
     nodes, groups, own, rest, squares = missing.average.shape[0], force.shape[0], 0.0j, 0.0, 0.0

@@ -40,7 +40,7 @@ _FIRST = np.int64(0)
 _LAST = np.int64(ORDER - 1)
 
 
-@kernel(fastmath=_FAST, error_model="numpy")
+@kernel(inner=True, forceinline=True, fastmath=_FAST, error_model="numpy")
 def _turn(moved, first, start, stop, state):
     """The columns from start to stop of the states (S, .) moved on, in place; moved (blocks, 2, 2)."""
     for b in range(moved.shape[0]):
@@ -57,7 +57,7 @@ def _turn(moved, first, start, stop, state):
                 state[s + 1, j] = moved[b, 1, 0] * x + moved[b, 1, 1] * y
 
 
-@kernel(fastmath=_FAST, error_model="numpy")
+@kernel(inner=True, forceinline=True, fastmath=_FAST, error_model="numpy")
 def _lower(values, row):
     """Take the two highest Legendre components from a polynomial by its values at the nodes, values[row : row + m]."""
     for i in range(HIGHEST.shape[0]):
@@ -68,7 +68,7 @@ def _lower(values, row):
             values[row + j] -= share * HIGHEST[i, 1, j]
 
 
-@kernel(fastmath=_FAST, error_model="numpy")
+@kernel(inner=True, forceinline=True, fastmath=_FAST, error_model="numpy")
 def _tangents(law, loose, active, p, forced, values, acts, rows):
     """Forces, stiffness and damping at the nodes of panel p into values (3, G m), which channels act there into acts
     (G,), and their nodes into rows, one node after the other; returns how many these are, and whether any has damping.
@@ -94,7 +94,7 @@ def _tangents(law, loose, active, p, forced, values, acts, rows):
     return count, moving
 
 
-@kernel(fastmath=_FAST, error_model="numpy")
+@kernel(inner=True, forceinline=True, fastmath=_FAST, error_model="numpy")
 def _still(e, w, motion, first, driven, r, acts, start, given, states):
     """The states (m, S) that forces r of channels that do not act make from none, `start`; `given` (G m,) is room."""
     some = False
@@ -104,7 +104,7 @@ def _still(e, w, motion, first, driven, r, acts, start, given, states):
     along(e, w, motion, first, driven, given, start, _FIRST if some else _LAST, states)
 
 
-@kernel(fastmath=_FAST, error_model="numpy")
+@kernel(inner=True, forceinline=True, fastmath=_FAST, error_model="numpy")
 def _known(read, flexible, states, felt, acts, values, rows, count, f):
     """Forces at the nodes `rows`, count of them, as far as they are known, into the last column of f: r, and if any is
     felt what those r that do not act make of stiffness and damping, by the states (m, S) that follow from these.
@@ -121,14 +121,14 @@ def _known(read, flexible, states, felt, acts, values, rows, count, f):
         f[i, last] = values[0, rows[i]] + values[1, rows[i]] * q + values[2, rows[i]] * v
 
 
-@kernel(fastmath=_FAST, error_model="numpy")
+@kernel(inner=True, forceinline=True, fastmath=_FAST, error_model="numpy")
 def _room(forces, groups, size, columns):
     """Arrays for `_solve` to work in."""
     equations, begin, after = np.empty((forces, forces)), np.empty((groups, groups)), np.empty((forces, groups))
     return equations, begin, after, np.empty((forces, size)), np.empty((forces, columns))
 
 
-@kernel(fastmath=_FAST, error_model="numpy")
+@kernel(inner=True, forceinline=True, fastmath=_FAST, error_model="numpy")
 def _solve(reading, influence, total, values, rows, count, moving, f, room):
     """Forces at the nodes `rows`, count of them, from states `total` at a panel's start, and f as far as these are
     known, into f; room: arrays to work in.
@@ -163,7 +163,7 @@ def _solve(reading, influence, total, values, rows, count, moving, f, room):
     eliminate(a, f[here:count], count - here)
 
 
-@kernel(fastmath=_FAST, error_model="numpy")
+@kernel(inner=True, forceinline=True, fastmath=_FAST, error_model="numpy")
 def _other_form(turn, total, room):
     """The states (S, .) of one form as those of another, in place."""
     np.dot(turn, total, room)
@@ -172,7 +172,7 @@ def _other_form(turn, total, room):
             total[s, j] = room[s, j]
 
 
-@kernel(fastmath=_FAST, error_model="numpy")
+@kernel(inner=True, forceinline=True, fastmath=_FAST, error_model="numpy")
 def _kick(amount, read, driven, total):
     """Add impulses, so many times what is read of the states (S, .), to these."""
     for j in range(total.shape[1]):
@@ -183,7 +183,7 @@ def _kick(amount, read, driven, total):
             total[s, j] += amount * q * driven[s]
 
 
-@kernel(fastmath=_FAST, error_model="numpy")
+@kernel(inner=True, forceinline=True, fastmath=_FAST, error_model="numpy")
 def _enter(entering, rows, count, f, packed, added, total):
     """Add what forces f at the nodes `rows`, count of them, leave in the states (S, .) at a panel's end; packed and
     added are room to work in.
@@ -199,7 +199,7 @@ def _enter(entering, rows, count, f, packed, added, total):
             total[s, j] += added[s, j]
 
 
-@kernel(fastmath=_FAST, error_model="numpy")
+@kernel(inner=True, forceinline=True, fastmath=_FAST, error_model="numpy")
 def _made(made, acts, parts):
     """Whether all that is wanted of the channels that act, (G,), is known; made: see `structure`."""
     known = True
@@ -208,7 +208,7 @@ def _made(made, acts, parts):
     return known
 
 
-@kernel(fastmath=_FAST, error_model="numpy")
+@kernel(inner=True, forceinline=True, fastmath=_FAST, error_model="numpy")
 def _note(r, acts, rows, count, f, acting, solved):
     """Keep which channels act on a panel, and all forces there: f at the nodes `rows`, count of them, else r."""
     for l in range(count):
@@ -362,7 +362,7 @@ def response(structures, stretch, forms, active, acting, solved, states, start, 
     return worst
 
 
-@kernel(fastmath=_FAST, error_model="numpy")
+@kernel(inner=True, forceinline=True, fastmath=_FAST, error_model="numpy")
 def _follow(step, waiting, later):
     """A panel's exponential (2, 2) after those that wait, if any do, in place."""
     for j in range(2):

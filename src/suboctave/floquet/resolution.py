@@ -104,7 +104,7 @@ def tolerated(spans, forces, law, base, active, held, limits):
     return limits[0] + limits[1] * min(1.0, left / whole), left, acting
 
 
-@kernel()
+@kernel(inner=True, forceinline=True)
 def _sight(seen, speed, decays, since, power):
     """How fast what blocks add to a force turns, rad per unit time, at a time `since` the last of what sets them off;
     seen, speed (B,): logarithms of the share of each in the force at its beginning, and of its rate.
@@ -117,7 +117,7 @@ def _sight(seen, speed, decays, since, power):
     return math.exp(fastest)
 
 
-@kernel()
+@kernel(inner=True)
 def _forces(law, loose, active, p, rates, flexibility, stiffening, seen):
     """Rate of the forces on panel p, and the logarithms of the share of every block in them into seen (B,); see
     `divided`.
@@ -143,7 +143,7 @@ def _forces(law, loose, active, p, rates, flexibility, stiffening, seen):
     return math.sqrt(squared) + rate
 
 
-@kernel()
+@kernel(inner=True)
 def _grown(rows):
     """Room for twice as many rows."""
     out = np.empty((2 * rows.shape[0], rows.shape[1]))

@@ -30,7 +30,7 @@ def no_verdict(multipliers: ComplexArray, errors: Array) -> NDArray[np.bool_]:
     return vague
 
 
-@kernel()
+@kernel(inner=True, forceinline=True)
 def _known_within(mu, error):
     """How far off a multiplier may be: anywhere, where its error estimate is too large to mean anything."""
     return error if error <= max(NO_VERDICT, _SHARE * abs(mu)) else np.inf

@@ -64,7 +64,7 @@ def symmetric_functions(mu: ComplexArray) -> Array:
     return out
 
 
-@kernel()
+@kernel(inner=True)
 def multiply(mu, k, column, out):
     """fold, double, torus or the product of all `1 - mu_i / mu_j` (k = 0, 1, 2, 3) of multipliers (m,) into the columns
     of (2, C): `column` (m, m) says into which the factor of i and j < i goes, at [i, 0] for fold and double; one that

@@ -93,7 +93,7 @@ class Stack(NamedTuple):
         return out
 
 
-@kernel(fastmath=_FAST, error_model="numpy")
+@kernel(inner=True, fastmath=_FAST, error_model="numpy")
 def _behind(a, b, begin, end, n):
     """The equations behind those from begin to end, n in all, without the unknowns of these, in place: b too."""
     rows, more, columns = n - end, n - end, b.shape[1]
@@ -116,7 +116,7 @@ def _behind(a, b, begin, end, n):
             b[end + i, j] -= taken[i, more + j]
 
 
-@kernel(fastmath=_FAST, error_model="numpy")
+@kernel(inner=True, fastmath=_FAST, error_model="numpy")
 def _before(a, b, begin, end):
     """Take what is known of the unknowns from begin to end from the right sides b of those before, in place."""
     columns = b.shape[1]
@@ -132,7 +132,7 @@ def _before(a, b, begin, end):
             b[i, j] -= taken[i, j]
 
 
-@kernel(fastmath=_FAST, error_model="numpy")
+@kernel(forceinline=True, fastmath=_FAST, error_model="numpy")
 def eliminate(a, b, n):
     """Solve `a x = b`, n equations, for the columns of b, in place, by Gauss's elimination with pivots, block by block;
     zeros within a block cost nothing.
@@ -177,7 +177,7 @@ def eliminate(a, b, n):
             _before(a, b, begin, end)
 
 
-@kernel(fastmath={"contract"})
+@kernel(inner=True, fastmath={"contract"})
 def _dynamic(entries, frequency, order, z):
     """All entries of Z, or of its derivative by Omega, into z (.,)."""
     by = factors(frequency, order)
@@ -185,7 +185,7 @@ def _dynamic(entries, frequency, order, z):
         z[i] = by[0] * entries[0, i] + by[1] * entries[1, i] + by[2] * entries[2, i] + by[3] * entries[3, i]
 
 
-@kernel(fastmath={"contract"})
+@kernel(inner=True, fastmath={"contract"})
 def _beside(z, diagonal, left, right, across, along):
     """The transpose of `Z_qz - left^T Z_zz` into across (s, m), or nothing if that has no columns, and `Z_zq - Z_zz
     right` into along (s, m + l).

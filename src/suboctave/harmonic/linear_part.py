@@ -286,7 +286,7 @@ def differentiated(
     return np.array([np.zeros((n, n)) if one is None else one.value(values) for one in found])
 
 
-@kernel()
+@kernel(inner=True, forceinline=True)
 def factors(w, order):
     """What M, C, K, S are multiplied by in the dynamic stiffness at w, complex, or in its derivative by Omega."""
     if order == 0:

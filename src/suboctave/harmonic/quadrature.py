@@ -133,7 +133,7 @@ def rule_tables() -> tuple[Array, Array]:
     return nodes, weights
 
 
-@kernel()
+@kernel(inner=True, forceinline=True)
 def _roots(x, d, s, point, width):
     """Both complex offsets at which the parabola (x, d, s) equals point + i width: real and imaginary parts.
 
@@ -231,7 +231,7 @@ def singular_instants(c, points, widths, reach, zr, zi):
     return out
 
 
-@kernel(fastmath=FAST)
+@kernel(inner=True, fastmath=FAST)
 def _fill(zr, zi, w, count, centre, sign, distance, first, last, plain, phase, nodes, weights, offset):
     """Append the nodes of one piece, offsets (first, last) from `centre` in the direction `sign`; returns the count."""
     if plain:

@@ -166,7 +166,7 @@ def spectra(values, weights, zr, zi, top):
     return out
 
 
-@kernel()
+@kernel(forceinline=True)
 def jet(c, zr, zi):
     """Value, first and second derivative of `Re sum_k c_k z^k` with respect to tau at one point."""
     pr = pi = dr = di = sr = 0.0

@@ -64,7 +64,7 @@ _NEAR = 0.1
 _HIGH = 0.9
 
 
-@kernel(error_model="numpy")
+@kernel(inner=True, error_model="numpy")
 def _first_root(m0, d0, m1, d1):
     """Where Hermite's cubic on [0, 1] turns negative for the first time, it or its minimum; -1.0 if it does not."""
     a, b = 2.0 * (m0 - m1) + d0 + d1, 3.0 * (m1 - m0) - 2.0 * d0 - d1
@@ -98,13 +98,13 @@ def _first_root(m0, d0, m1, d1):
     return 0.5 * (low + top)
 
 
-@kernel(error_model="numpy")
+@kernel(inner=True, error_model="numpy")
 def _folded(x, turn):
     """|x| of an angle taken within half a turn; of what is no angle, the turn of which is beyond all numbers, |x|."""
     return abs(x - turn * math.floor(x / turn + 0.5))
 
 
-@kernel(error_model="numpy")
+@kernel(inner=True, error_model="numpy")
 def _turn(c, at, n, i, h):
     """Where velocity i changes sign in the step tried, as a share of it, and |displacement| there, by a quintic."""
     y, k, trial = at[_Y] + i, at[_K] + n + i, at[_TRIAL] + i
@@ -127,7 +127,7 @@ def _turn(c, at, n, i, h):
     return low, _folded(top, c[at[_FOLD] + i])
 
 
-@kernel(error_model="numpy")
+@kernel(inner=True, error_model="numpy")
 def _cut(c, at, n, corners, h, period, measure):
     """The corner at which the trial step has landed, -1 if none; -2 if a shorter step must be tried.
 
@@ -179,7 +179,7 @@ def _cut(c, at, n, corners, h, period, measure):
     return landed
 
 
-@kernel(error_model="numpy")
+@kernel(inner=True, error_model="numpy")
 def _accept(c, l, at, n, corners, samples, skip, h, landed, out, peaks, measure):
     """Take the trial step, write the state at a sample, and limit the next step to the next sample.
 
@@ -249,7 +249,7 @@ def _accept(c, l, at, n, corners, samples, skip, h, landed, out, peaks, measure)
     return 0
 
 
-@kernel(error_model="numpy")
+@kernel(inner=True, error_model="numpy")
 def control(z, l, at, n, corners, samples, skip, tolerance, out, peaks, measure):
     """Judge the trial step of lane l and choose the next one. Returns 1 when the trajectory is complete.
 
@@ -304,7 +304,7 @@ def control(z, l, at, n, corners, samples, skip, tolerance, out, peaks, measure)
     return _accept(c, l, at, n, corners, samples, skip, h, landed, out, peaks, measure)
 
 
-@kernel(error_model="numpy")
+@kernel(inner=True, error_model="numpy")
 def follow(z, l, at, n, count, skip, growth):
     """Take over the `count` tangent vectors of lane l if its step was accepted; at a sample write their `growth`."""
     c = z[:, l]

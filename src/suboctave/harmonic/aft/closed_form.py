@@ -57,7 +57,7 @@ class ClosedLaws(NamedTuple):
     rules: tuple[Array, Array]
 
 
-@kernel()
+@kernel(inner=True)
 def contact_spectrum(tau, above, side, top):
     """Fourier coefficients q = 0 .. top of the indicator of `side * (x - level) > 0`, from the crossings of `level`.
 
@@ -90,7 +90,7 @@ def contact_spectrum(tau, above, side, top):
     return out
 
 
-@kernel(fastmath=FAST)
+@kernel(inner=True, fastmath=FAST)
 def product_spectrum(c, shift, chi, top):
     """Fourier coefficients k = 0 .. top of `(x - shift) * chi`, x given by its c_k, chi by chi_q with q up to top +
     H.
@@ -124,7 +124,7 @@ def product_spectrum(c, shift, chi, top):
     return out
 
 
-@kernel(fastmath=FAST)
+@kernel(inner=True, forceinline=True, fastmath=FAST)
 def add_values(coefficients, u, force, stiffness):
     """Add a polynomial of the displacement and its derivative, by Horner's rule, to force and stiffness (N,)."""
     if coefficients.shape[0] == 0:
@@ -176,7 +176,7 @@ def add_step(u, point, width, factor, force, stiffness):
         force[j] -= 0.5 * factor * width * math.log(1.0 + ratio * ratio)
 
 
-@kernel()
+@kernel(inner=True)
 def add_pieces(motions, pieces, first, zr, zi, table):
     """Add the Fourier coefficients of piecewise-linear laws along motions (G, H + 1), and of their slopes, to `table`
     (>= 2, >= G, top + 1).
@@ -209,7 +209,7 @@ def add_pieces(motions, pieces, first, zr, zi, table):
                 stiffness[q] += slope[q]
 
 
-@kernel()
+@kernel(inner=True)
 def add_smooth(c, polynomial, steps, zr, zi, weights, table, g):
     """Add the Fourier coefficients of a polynomial and of arctan steps (S, 3) along a motion (H + 1,), and of their
     slope, to direction g of `table` (>= 2, > g, top + 1), by nodes and weights on the circle.
