@@ -69,7 +69,7 @@ CHAINS = {
 def run(name: str, kind: str, contacts: list[int], harmonics: int | str, seconds: float) -> None:
     """Print a line for every number of contacts."""
     chain, first = CHAINS[name], 0.0
-    so.frequency_response(*chain.system(kind, 1), harmonics=harmonics, max_step=0.3, seconds=seconds)
+    so.frequency_response(*chain.system(kind, 1), harmonics=harmonics, max_step=0.3)
     for count in contacts:
         if count * chain.apart > chain.masses:
             continue
