@@ -55,6 +55,11 @@ def judged(systems: ModuleType, seed: int, nu: int = 1) -> dict[str, Any]:
             "two real multipliers outside the circle meet, and cross it as a pair right behind a grazing",
             marks=pytest.mark.slow,
         ),
+        pytest.param(
+            115,
+            "a pair comes inside the circle right before a contact grazes, and leaves it right behind",
+            marks=pytest.mark.slow,
+        ),
         (33, "with more harmonics, Newton's method runs from a limit point behind a grazing to the one before it"),
     ],
 )

@@ -28,7 +28,7 @@ from suboctave.continuation.linear import course
 from suboctave.continuation.point import CurvePoint
 from suboctave.continuation.problem import Array
 from suboctave.curves.events.monitors import BRANCH_POINT, BifurcationKind, Located, NeimarkSacker, changes
-from suboctave.curves.interior import FINEST, Interior, Steps, unsettled
+from suboctave.curves.interior import FINEST, Interior, Steps, unsettled, within
 from suboctave.curves.sample import Sample, compare, resolved
 from suboctave.curves.trace import Audit
 from suboctave.floquet.held import of_those_moved
@@ -37,7 +37,8 @@ from suboctave.floquet.symmetric import in_rings, symmetric_functions
 
 #: multipliers of modulus above one half may move by this much per interval (relative to their modulus above one)
 MOVEMENT = 0.5
-#: intervals shorter than this are not cut for the multipliers' movement, nor for that at +1 beside a branch point
+#: intervals shorter than this are not cut for the multipliers' movement, unless a contact grazes in them, nor for that
+#: at +1 beside a branch point
 _EXAMINED = 0.01
 #: distance from +1 or -1 up to which several real multipliers may be taken for each other
 _CROWD = 0.1
@@ -200,8 +201,11 @@ class GuardedStep(Interior):
         if doubt is not None:
             return doubt
         doubt = super().doubt(p, q)
-        if doubt is None and told and h > _EXAMINED and _too_fast(p, q, eventful):
-            return 0.5, "multipliers move too fast to be followed"
+        if doubt is None and told:
+            # at a grazing they turn like a square root: a pair may come inside right before it and leave right behind
+            place = self.steps.contacts(p, q).grazes
+            if h > (_EXAMINED if place is None else FINEST) and _too_fast(p, q, eventful):
+                return within(place or 0.5), "multipliers move too fast to be followed"
         # right beside a branch point at which the curve turns the multiplier at +1 is known up to its error only
         return None if doubt is not None and doubt[1] == _RETURNS and h <= _EXAMINED and self.turned else doubt
 

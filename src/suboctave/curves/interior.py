@@ -36,7 +36,7 @@ from suboctave.curves.trace import Unsettled
 from suboctave.errors import ConvergenceError
 from suboctave.harmonic.trigonometric import passages
 
-__all__ = ["FINEST", "Interior", "Steps", "contacts_between", "unsettled"]
+__all__ = ["FINEST", "Interior", "Steps", "contacts_between", "unsettled", "within"]
 
 #: intervals of scaled arclength that are not cut any further: events closer together are not told apart
 FINEST = 1e-5
@@ -355,7 +355,11 @@ class Interior(ABC):
 
 def _beside_grazing(place: float, h: float) -> float:
     """Where to cut an interval of length h in which a contact grazes, at a fraction of it: close beside that."""
-    share = place + math.copysign(_CLEAR * _LAYER / h, 0.5 - place)
+    return within(place + math.copysign(_CLEAR * _LAYER / h, 0.5 - place))
+
+
+def within(share: float) -> float:
+    """Where an interval is cut at most: not at its ends."""
     return min(1.0 - _ENDS, max(_ENDS, share))
 
 
